@@ -1,0 +1,34 @@
+"""tcrctl: experiments with cable-driven tensegrity continuum robots (TCR).
+
+One name for one thing. Every module uses this notation; SI units inside, other units only at the
+borders (YAML keys, JSON keys, PLC registers), where the unit is part of the name.
+
+================  ==========================================================  ================  =======
+name              meaning                                                     shape             unit
+================  ==========================================================  ================  =======
+``q``             node positions, world frame, flattened node by node         (3 n_nodes,)      m
+``v``             node velocities, same order as ``q``                        (3 n_nodes,)      m/s
+``a``             node accelerations, same order as ``q``                     (3 n_nodes,)      m/s2
+``drive``, d      cable length taken in by the actuator since rest, per       (m,)              m
+                  cable; positive shortens the cable
+``speed``, u      control input: d(drive)/dt, eq. (20)                        (m,)              m/s
+``tension``, λ    cable tension = Lagrange multiplier of the driving          (m,)              N
+                  constraint, eq. (9); never negative
+``rest_length``   unstretched length of an element                            (n_elements,)     m
+``y``, position   end position: centroid of the tip ring, eq. (11)            (3,)              m
+``n``, normal     end normal: unit normal of the tip ring, +z at rest         (3,)              1
+``theta_x, _y``   end orientation angles of eq. (45), both 0 at rest          ()                rad
+``period``        control period η                                            ()                s
+``horizon``       prediction horizon of the controller                        ()                s
+``step``          internal time step of an integrator                         ()                s
+``k``             index of the control step, 0 .. n-1
+================  ==========================================================  ================  =======
+
+World frame: right-handed, z up, origin in the centre of the base ring; the robot hangs towards -z.
+Nodes: module 0 is the fixed base; module i (1 .. n_modules) hangs below module i-1. Every module has
+four nodes, ``n1 n2 n3`` on its ring (counter-clockwise seen from +z) and ``apex``, so that node j of
+module i is row ``4 i + j``. In files a node is written ``base.n1``, ``m7.apex``.
+Equation numbers refer to the paper, key [TCR] in REFERENCES.md.
+"""
+
+__version__ = "0.1.0"

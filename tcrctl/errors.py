@@ -1,0 +1,161 @@
+"""Every error a user can meet: one base class, one exit code each, evidence in attributes.
+
+Exit codes: 1 internal error, 2 usage or invalid input, 3 a criterion failed, 4 stopped by a safety
+limit or divergence, 5 device, connection or file system, 130 Ctrl-C, 143 SIGTERM.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class TcrctlError(Exception):
+    """Base of all errors of tcrctl.
+
+    Attributes:
+        exit_code: Process exit code of this kind of error.
+        hint: What the user can do about it; may be empty.
+    """
+
+    exit_code = 1
+
+    def __init__(self, message: str, *, hint: str = "") -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong in an input file.
+
+    Attributes:
+        where: ``file:line:column`` or ``--set key`` of the offending value.
+        key: Dotted path of the value, for instance ``controller.horizon_s``.
+        message: What is wrong, with the value and what was allowed.
+    """
+
+    where: str
+    key: str
+    message: str
+
+    def __str__(self) -> str:
+        """Return ``where: key: message``."""
+        return f"{self.where}: {self.key}: {self.message}" if self.key else f"{self.where}: {self.message}"
+
+
+class InputError(TcrctlError):
+    """A file, option or name given by the user cannot be used."""
+
+    exit_code = 2
+
+
+class SpecError(InputError):
+    """A YAML file has problems; all of them are listed at once.
+
+    Attributes:
+        problems: Every problem found, in file order.
+    """
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        super().__init__("\n".join(str(problem) for problem in problems))
+        self.problems = tuple(problems)
+
+
+class UnknownNameError(InputError):
+    """A name was given that does not exist.
+
+    Attributes:
+        kind: What was looked for ("experiment", "robot", "node", ...).
+        name: The name given.
+        allowed: The names that exist.
+    """
+
+    def __init__(self, kind: str, name: str, allowed: Sequence[str]) -> None:
+        super().__init__(f"there is no {kind} named {name!r}; known: {', '.join(allowed)}")
+        self.kind, self.name, self.allowed = kind, name, tuple(allowed)
+
+
+class InfeasibleError(InputError):
+    """The reference cannot be followed by this robot within its limits.
+
+    Attributes:
+        time: First offending time [s].
+        quantity: Name of the quantity that breaks its limit.
+        value: Its value.
+        limit: The limit.
+        unit: Unit of value and limit.
+    """
+
+    def __init__(self, time: float, quantity: str, value: float, limit: float, unit: str, *, hint: str = "") -> None:
+        super().__init__(
+            f"infeasible at t = {time:.3f} s: {quantity} is {value:.4g} {unit}, limit {limit:.4g} {unit}", hint=hint
+        )
+        self.time, self.quantity, self.value, self.limit, self.unit = time, quantity, value, limit, unit
+
+
+class NoEquilibriumError(InputError):
+    """The static problem has no solution that the solver could find.
+
+    Attributes:
+        residual: Largest remaining nodal force [N].
+        tolerance: Force accepted as equilibrium [N].
+        iterations: Newton iterations spent.
+    """
+
+    def __init__(self, what: str, residual: float, tolerance: float, iterations: int) -> None:
+        super().__init__(
+            f"no equilibrium found for {what}: largest nodal force {residual:.3g} N after {iterations} iterations, "
+            f"accepted {tolerance:.3g} N",
+            hint="Check spring stiffness, initial tension and cone height; a slack or buckled robot has no stable shape.",
+        )
+        self.residual, self.tolerance, self.iterations = residual, tolerance, iterations
+
+
+class StoppedError(TcrctlError):
+    """The run was stopped by a safety limit or by divergence.
+
+    Attributes:
+        step: Control step k at which the run stopped.
+    """
+
+    exit_code = 4
+
+    def __init__(self, message: str, step: int = -1, *, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.step = step
+
+
+class DivergenceError(StoppedError):
+    """The simulated plant could not complete a time step.
+
+    Attributes:
+        time: Simulated time [s].
+        residual: Largest remaining nodal force [N].
+        smallest_step: Smallest time step that was tried [s].
+    """
+
+    def __init__(self, time: float, residual: float, smallest_step: float) -> None:
+        super().__init__(
+            f"the simulated plant did not converge at t = {time:.4f} s: residual {residual:.3g} N "
+            f"with sub-steps down to {smallest_step:.2g} s"
+        )
+        self.time, self.residual, self.smallest_step = time, residual, smallest_step
+
+
+class DeviceError(TcrctlError):
+    """A device, connection or the file system failed."""
+
+    exit_code = 5
+
+
+class LogError(DeviceError):
+    """A log could not be written or read.
+
+    Attributes:
+        path: The log file.
+    """
+
+    def __init__(self, path: object, message: str, *, hint: str = "") -> None:
+        super().__init__(f"{path}: {message}", hint=hint)
+        self.path = str(path)

@@ -1,0 +1,181 @@
+"""What flows round the loop: frozen records, SI units, world frame, time-stamped.
+
+    trajectory -> Reference --+
+    plant -> Measurement -> estimator -> Estimate -> controller -> Command -> plant
+                                          every record of one step -> StepRecord -> log
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """Target of the end ring now and at the prediction instants.
+
+    Attributes:
+        t: Time of this step [s].
+        position: End position wanted at ``t`` (3,) [m].
+        normal: End normal wanted at ``t`` (3,), or None for position-only tracking.
+        ahead_position: End positions wanted at the controller's prediction instants (n, 3) [m].
+        ahead_normal: End normals wanted there (n, 3), or None.
+    """
+
+    t: float
+    position: Array
+    normal: Array | None
+    ahead_position: Array
+    ahead_normal: Array | None
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """What the cameras and the drives report.
+
+    Attributes:
+        t: Instant at which the nodes were where they are reported [s].
+        nodes: Ring node positions (n_markers, 3), single precision as cameras deliver them [m].
+        valid: Which markers were seen (n_markers,) bool.
+        drive: Drive lengths reported by the actuators (m,) [m].
+    """
+
+    t: float
+    nodes: NDArray[np.float32]
+    valid: NDArray[np.bool_]
+    drive: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """State of the robot model after one estimator update.
+
+    Attributes:
+        t: Time the state refers to [s].
+        q: Node positions (3 n_nodes,) [m].
+        v: Node velocities (3 n_nodes,) [m/s].
+        drive: Drive lengths (m,) [m].
+        tension: Cable tensions of the model (m,) [N].
+        position: End position (3,) [m].
+        normal: End normal (3,).
+        disturbance: Force that the model lacks, per node coordinate (3 n_nodes,) [N].
+        converged: False if the estimator's own solve failed and the state was extrapolated.
+    """
+
+    t: float
+    q: Array
+    v: Array
+    drive: Array
+    tension: Array
+    position: Array
+    normal: Array
+    disturbance: Array
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What is asked of the actuators for one control period.
+
+    Attributes:
+        speed: Drive speeds u (m,) [m/s].
+        drive: Drive lengths to be reached at the end of the period (m,) [m].
+    """
+
+    speed: Array
+    drive: Array
+
+
+@dataclass(frozen=True, slots=True)
+class ControlInfo:
+    """How the controller came to its command.
+
+    Attributes:
+        converged: The inner problem was solved within its tolerance; otherwise the last safe command is held.
+        iterations: Iterations of the inner problem.
+        residual: Its residual at the end [N].
+        lcp_residual: Complementarity residual of the LCP solution.
+        lcp_pivots: Pivots of Lemke's algorithm.
+        saturated: Which inputs stand at a speed limit (m,) bool.
+        predicted_tension: Tensions at the end of the horizon (m,) [N].
+        integral: State of the integral action (3,) or (6,) [m], [1].
+        reason: Empty, or why the step was not usable.
+    """
+
+    converged: bool
+    iterations: int
+    residual: float
+    lcp_residual: float
+    lcp_pivots: int
+    saturated: NDArray[np.bool_]
+    predicted_tension: Array
+    integral: Array
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What only a simulated plant knows about itself.
+
+    Attributes:
+        position: End position (3,) [m].
+        normal: End normal (3,).
+        tension: Cable tensions (m,) [N].
+        q: Node positions (3 n_nodes,) [m].
+    """
+
+    position: Array
+    normal: Array
+    tension: Array
+    q: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Wall-clock durations of the sections of one tick [s].
+
+    Attributes:
+        read: Waiting for and reading the plant.
+        estimate: Estimator.
+        control: Controller.
+        write: Sending the command (simulated plant: advancing it).
+        lateness: How late the tick began after its deadline; 0 when not paced.
+    """
+
+    read: float
+    estimate: float
+    control: float
+    write: float
+    lateness: float
+
+
+@dataclass(frozen=True, slots=True)
+class StepRecord:
+    """Everything that entered or left the controller in one step.
+
+    Attributes:
+        k: Step index.
+        t: Time of the step [s].
+        period: Control period the controller used [s].
+        wanted: Command before limits.
+        applied: Command after limits: what was really sent.
+        truth: Simulated truth, or None on a rig.
+    """
+
+    k: int
+    t: float
+    period: float
+    reference: Reference
+    measurement: Measurement
+    estimate: Estimate
+    wanted: Command
+    applied: Command
+    info: ControlInfo
+    truth: Truth | None
+    timing: Timing
