@@ -1,0 +1,1 @@
+"""Trajectories: t -> Reference; one file per kind, settings in ``settings.py``."""

@@ -1,0 +1,200 @@
+"""What a ``trajectory:`` section may say: one model per kind, units in the key names."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, TypeAlias, TypeVar
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
+
+JOIN_TOLERANCE_MM = 1e-6
+AXIS_TOLERANCE = 1e-3  # axes typed with four decimals pass; the builder makes them exactly orthonormal
+
+# strict: neither true nor "3" is a number; the tuples still take YAML lists
+Number: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
+NotNegative: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
+Point: TypeAlias = tuple[Number, Number]
+Vector: TypeAlias = tuple[Number, Number, Number]
+_Item = TypeVar("_Item")
+
+
+def _checked_line(line: tuple[Point, ...]) -> tuple[Point, ...]:
+    if len(line) < 2:
+        raise ValueError(f"a line needs at least 2 points, it has {len(line)}")
+    for i in range(1, len(line)):
+        if math.dist(line[i - 1], line[i]) <= JOIN_TOLERANCE_MM:
+            raise ValueError(f"points {i} and {i + 1} are the same: ({line[i][0]:g}, {line[i][1]:g}) mm")
+    return line
+
+
+def _not_empty(items: tuple[_Item, ...]) -> tuple[_Item, ...]:
+    # not min_length: that also complains when an item has an error of its own
+    if not items:
+        raise ValueError("needs at least 1 item, it has none")
+    return items
+
+
+def _check_one_of(shapes: dict[str, object]) -> None:
+    given = [name for name, shape in shapes.items() if shape is not None]
+    if len(given) != 1:
+        raise ValueError(f"give exactly one of {', '.join(shapes)}; given: {', '.join(given) or 'none'}")
+
+
+Polyline: TypeAlias = Annotated[tuple[Point, ...], AfterValidator(_checked_line)]
+
+
+class Settings(BaseModel):
+    """Common rules: immutable, no unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class ArcSettings(Settings):
+    """Circular arc; counter-clockwise when ``to_deg`` is larger than ``from_deg``, else clockwise."""
+
+    center: Point = Field(description="centre in the drawing plane [mm]")
+    radius: Positive = Field(description="radius [mm]")
+    from_deg: Number = Field(description="angle of the first point, from the plane's x axis [deg]")
+    to_deg: Number = Field(description="angle of the last point [deg]")
+
+    @model_validator(mode="after")
+    def _has_length(self) -> ArcSettings:
+        if self.radius * math.radians(abs(self.to_deg - self.from_deg)) <= JOIN_TOLERANCE_MM:
+            raise ValueError(f"the arc has no length: from_deg = {self.from_deg:g}, to_deg = {self.to_deg:g}")
+        return self
+
+    def at(self, angle_deg: float) -> Point:
+        """Return the point of the circle at an angle [mm]."""
+        angle = math.radians(angle_deg)
+        return (
+            self.center[0] + self.radius * math.cos(angle),
+            self.center[1] + self.radius * math.sin(angle),
+        )
+
+
+class SegmentSettings(Settings):
+    """One part of a composite stroke: exactly one of ``line`` and ``arc``."""
+
+    line: Polyline | None = Field(default=None, description="corner points of a polyline, two or more [mm]")
+    arc: ArcSettings | None = Field(default=None, description="circular arc")
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> SegmentSettings:
+        _check_one_of({"line": self.line, "arc": self.arc})
+        return self
+
+    @property
+    def ends(self) -> tuple[Point, Point]:
+        """First and last point [mm]."""
+        if self.arc is not None:
+            return self.arc.at(self.arc.from_deg), self.arc.at(self.arc.to_deg)
+        assert self.line is not None
+        return self.line[0], self.line[-1]
+
+
+class StrokeSettings(Settings):
+    """One uninterrupted stroke: exactly one of ``line``, ``arc`` and ``path``."""
+
+    line: Polyline | None = Field(default=None, description="corner points of a polyline, two or more [mm]")
+    arc: ArcSettings | None = Field(default=None, description="circular arc")
+    path: Annotated[tuple[SegmentSettings, ...], AfterValidator(_not_empty)] | None = Field(
+        default=None, description="lines and arcs one after the other; each begins where the last one ends"
+    )
+
+    @field_validator("path")
+    @classmethod
+    def _ends_join(cls, path: tuple[SegmentSettings, ...] | None) -> tuple[SegmentSettings, ...] | None:
+        for i in range(1, len(path or ())):
+            assert path is not None
+            end, start = path[i - 1].ends[1], path[i].ends[0]
+            if math.dist(end, start) > JOIN_TOLERANCE_MM:
+                raise ValueError(
+                    f"segment {i + 1} starts at ({start[0]:.7f}, {start[1]:.7f}) mm, but segment {i} ends at "
+                    f"({end[0]:.7f}, {end[1]:.7f}) mm; they must join within {JOIN_TOLERANCE_MM:g} mm"
+                )
+        return path
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> StrokeSettings:
+        _check_one_of({"line": self.line, "arc": self.arc, "path": self.path})
+        return self
+
+    @property
+    def segments(self) -> tuple[SegmentSettings, ...]:
+        """The stroke as a sequence of lines and arcs."""
+        return self.path if self.path is not None else (SegmentSettings(line=self.line, arc=self.arc),)
+
+
+class PlaneSettings(Settings):
+    """Where the drawing lies: its origin is the rest end position plus an offset."""
+
+    offset_mm: Vector = Field(
+        default=(0.0, 0.0, 0.0), description="drawing origin minus rest end position, world frame [mm]"
+    )
+    x_axis: Vector = Field(
+        default=(1.0, 0.0, 0.0), description="direction of the drawing's x axis, world frame [1]"
+    )
+    y_axis: Vector = Field(
+        default=(0.0, 1.0, 0.0), description="direction of the drawing's y axis, world frame [1]"
+    )
+
+    @model_validator(mode="after")
+    def _axes_are_orthonormal(self) -> PlaneSettings:
+        for name, axis in (("x_axis", self.x_axis), ("y_axis", self.y_axis)):
+            if abs(math.hypot(*axis) - 1.0) > AXIS_TOLERANCE:
+                raise ValueError(f"{name} must have length 1, it has {math.hypot(*axis):.6g}")
+        product = sum(a * b for a, b in zip(self.x_axis, self.y_axis, strict=True))
+        if abs(product) > AXIS_TOLERANCE:
+            raise ValueError(
+                f"x_axis and y_axis must be perpendicular, their scalar product is {product:.6g}"
+            )
+        return self
+
+
+class StrokesSettings(Settings):
+    """A drawing in a plane: strokes in order, joined by straight travel moves; position only."""
+
+    kind: Literal["strokes"]
+    plane: PlaneSettings = Field(default_factory=PlaneSettings, description="where the drawing lies")
+    strokes: Annotated[tuple[StrokeSettings, ...], AfterValidator(_not_empty)] = Field(
+        description="strokes in drawing order, at least one"
+    )
+    speed_limit_mm_s: Positive = Field(default=20.0, description="peak speed while drawing [mm/s]")
+    travel_speed_limit_mm_s: Positive = Field(
+        default=25.0, description="peak speed of approach and travel moves [mm/s]"
+    )
+    acceleration_limit_mm_s2: Positive = Field(
+        default=30.0, description="peak acceleration, tangential and centripetal together [mm/s2]"
+    )
+    ramp_s: Positive = Field(default=1.2, description="shortest duration of any change of speed [s]")
+    corner: Literal["stop", "round"] = Field(
+        default="stop",
+        description="come to rest at corners, or replace them by an arc (where it does not fit: stop)",
+    )
+    corner_angle_deg: NotNegative = Field(
+        default=5.0, description="change of direction from which on a join is a corner [deg]", lt=180.0
+    )
+    corner_radius_mm: Positive = Field(default=3.0, description="radius of the arc of corner: round [mm]")
+    lead_in_s: NotNegative = Field(
+        default=1.0, description="rest at the start pose before the first move [s]"
+    )
+    dwell_s: NotNegative = Field(default=0.5, description="rest after every stroke [s]")
+    settle_s: NotNegative = Field(default=2.0, description="rest at the very end, after the last dwell [s]")
+
+
+class HoldSettings(Settings):
+    """Stand still at the rest pose, or beside it."""
+
+    kind: Literal["hold"]
+    duration_s: Positive = Field(description="how long [s]")
+    offset_mm: Vector = Field(
+        default=(0.0, 0.0, 0.0),
+        description="target minus rest end position, world frame; a step input if not zero [mm]",
+    )
+    orientation: Literal["free", "rest"] = Field(
+        default="free", description="free: position only; rest: the end normal of the rest pose is wanted too"
+    )
+
+
+TrajectorySettings: TypeAlias = Annotated[StrokesSettings | HoldSettings, Field(discriminator="kind")]
