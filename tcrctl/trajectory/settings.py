@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, TypeAlias, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
+
+from ..settings import Settings, quantity
 
 JOIN_TOLERANCE_MM = 1e-6
 AXIS_TOLERANCE = 1e-3  # axes typed with four decimals pass; the builder makes them exactly orthonormal
 
-# strict: neither true nor "3" is a number; the tuples still take YAML lists
-Number: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
-NotNegative: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
-Point: TypeAlias = tuple[Number, Number]
-Vector: TypeAlias = tuple[Number, Number, Number]
+Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
+NotNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
+Point: TypeAlias = tuple[float, float]
+Vector: TypeAlias = tuple[float, float, float]
 _Item = TypeVar("_Item")
 
 
@@ -44,19 +44,13 @@ def _check_one_of(shapes: dict[str, object]) -> None:
 Polyline: TypeAlias = Annotated[tuple[Point, ...], AfterValidator(_checked_line)]
 
 
-class Settings(BaseModel):
-    """Common rules: immutable, no unknown keys."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
 class ArcSettings(Settings):
     """Circular arc; counter-clockwise when ``to_deg`` is larger than ``from_deg``, else clockwise."""
 
-    center: Point = Field(description="centre in the drawing plane [mm]")
-    radius: Positive = Field(description="radius [mm]")
-    from_deg: Number = Field(description="angle of the first point, from the plane's x axis [deg]")
-    to_deg: Number = Field(description="angle of the last point [deg]")
+    center: Point = quantity("mm", "centre in the drawing plane")
+    radius: Positive = quantity("mm", "radius")
+    from_deg: float = quantity("deg", "angle of the first point, from the plane's x axis")
+    to_deg: float = quantity("deg", "angle of the last point")
 
     @model_validator(mode="after")
     def _has_length(self) -> ArcSettings:
@@ -76,7 +70,7 @@ class ArcSettings(Settings):
 class SegmentSettings(Settings):
     """One part of a composite stroke: exactly one of ``line`` and ``arc``."""
 
-    line: Polyline | None = Field(default=None, description="corner points of a polyline, two or more [mm]")
+    line: Polyline | None = quantity("mm", "corner points of a polyline, two or more", None)
     arc: ArcSettings | None = Field(default=None, description="circular arc")
 
     @model_validator(mode="after")
@@ -96,7 +90,7 @@ class SegmentSettings(Settings):
 class StrokeSettings(Settings):
     """One uninterrupted stroke: exactly one of ``line``, ``arc`` and ``path``."""
 
-    line: Polyline | None = Field(default=None, description="corner points of a polyline, two or more [mm]")
+    line: Polyline | None = quantity("mm", "corner points of a polyline, two or more", None)
     arc: ArcSettings | None = Field(default=None, description="circular arc")
     path: Annotated[tuple[SegmentSettings, ...], AfterValidator(_not_empty)] | None = Field(
         default=None, description="lines and arcs one after the other; each begins where the last one ends"
@@ -129,15 +123,9 @@ class StrokeSettings(Settings):
 class PlaneSettings(Settings):
     """Where the drawing lies: its origin is the rest end position plus an offset."""
 
-    offset_mm: Vector = Field(
-        default=(0.0, 0.0, 0.0), description="drawing origin minus rest end position, world frame [mm]"
-    )
-    x_axis: Vector = Field(
-        default=(1.0, 0.0, 0.0), description="direction of the drawing's x axis, world frame [1]"
-    )
-    y_axis: Vector = Field(
-        default=(0.0, 1.0, 0.0), description="direction of the drawing's y axis, world frame [1]"
-    )
+    offset_mm: Vector = quantity("mm", "drawing origin minus rest end position, world frame", (0.0, 0.0, 0.0))
+    x_axis: Vector = quantity("1", "direction of the drawing's x axis, world frame", (1.0, 0.0, 0.0))
+    y_axis: Vector = quantity("1", "direction of the drawing's y axis, world frame", (0.0, 1.0, 0.0))
 
     @model_validator(mode="after")
     def _axes_are_orthonormal(self) -> PlaneSettings:
@@ -160,37 +148,32 @@ class StrokesSettings(Settings):
     strokes: Annotated[tuple[StrokeSettings, ...], AfterValidator(_not_empty)] = Field(
         description="strokes in drawing order, at least one"
     )
-    speed_limit_mm_s: Positive = Field(default=20.0, description="peak speed while drawing [mm/s]")
-    travel_speed_limit_mm_s: Positive = Field(
-        default=25.0, description="peak speed of approach and travel moves [mm/s]"
+    speed_limit_mm_s: Positive = quantity("mm/s", "peak speed while drawing", 20.0)
+    travel_speed_limit_mm_s: Positive = quantity("mm/s", "peak speed of approach and travel moves", 25.0)
+    acceleration_limit_mm_s2: Positive = quantity(
+        "mm/s2", "peak acceleration, tangential and centripetal together", 30.0
     )
-    acceleration_limit_mm_s2: Positive = Field(
-        default=30.0, description="peak acceleration, tangential and centripetal together [mm/s2]"
-    )
-    ramp_s: Positive = Field(default=1.2, description="shortest duration of any change of speed [s]")
+    ramp_s: Positive = quantity("s", "shortest duration of any change of speed", 1.2)
     corner: Literal["stop", "round"] = Field(
         default="stop",
         description="come to rest at corners, or replace them by an arc (where it does not fit: stop)",
     )
-    corner_angle_deg: NotNegative = Field(
-        default=5.0, description="change of direction from which on a join is a corner [deg]", lt=180.0
+    corner_angle_deg: NotNegative = quantity(
+        "deg", "change of direction from which on a join is a corner", 5.0, lt=180.0
     )
-    corner_radius_mm: Positive = Field(default=3.0, description="radius of the arc of corner: round [mm]")
-    lead_in_s: NotNegative = Field(
-        default=1.0, description="rest at the start pose before the first move [s]"
-    )
-    dwell_s: NotNegative = Field(default=0.5, description="rest after every stroke [s]")
-    settle_s: NotNegative = Field(default=2.0, description="rest at the very end, after the last dwell [s]")
+    corner_radius_mm: Positive = quantity("mm", "radius of the arc of corner: round", 3.0)
+    lead_in_s: NotNegative = quantity("s", "rest at the start pose before the first move", 1.0)
+    dwell_s: NotNegative = quantity("s", "rest after every stroke", 0.5)
+    settle_s: NotNegative = quantity("s", "rest at the very end, after the last dwell", 2.0)
 
 
 class HoldSettings(Settings):
     """Stand still at the rest pose, or beside it."""
 
     kind: Literal["hold"]
-    duration_s: Positive = Field(description="how long [s]")
-    offset_mm: Vector = Field(
-        default=(0.0, 0.0, 0.0),
-        description="target minus rest end position, world frame; a step input if not zero [mm]",
+    duration_s: Positive = quantity("s", "how long")
+    offset_mm: Vector = quantity(
+        "mm", "target minus rest end position, world frame; a step input if not zero", (0.0, 0.0, 0.0)
     )
     orientation: Literal["free", "rest"] = Field(
         default="free", description="free: position only; rest: the end normal of the rest pose is wanted too"
