@@ -1,0 +1,22 @@
+"""The log: one MCAP file per run, in which every control step survives bit for bit.
+
+=====================================  ===========================  =========================================
+record                                 schema                       content
+=====================================  ===========================  =========================================
+attachments, first                     as given                     spec, resolved spec, robot, versions, ...
+metadata ``tcrctl.run.start``, first   -                            who, when, what ran, period, clock
+``/tcrctl/step``                       ``tcrctl.v1.Step``           one message per step, sequence = k
+``/tcrctl/event``, ``/log``            ``tcrctl.v1.Event``,         phase changes, limit trips, stops
+                                       ``foxglove.Log``
+``/tf``                                ``foxglove.FrameTransforms``  ring frames in the world, <= 60 Hz
+``/tip/measured``, ``/tip/reference``  ``foxglove.PoseInFrame``     end poses, <= 60 Hz
+``/backbone``                          ``foxglove.PosesInFrame``    ring centres with orientation, <= 60 Hz
+``/scene``                             ``foxglove.SceneUpdate``     rings, rods, cables by tension, <= 10 Hz
+metadata ``tcrctl.run.stop``, last     -                            status, reason, criteria
+=====================================  ===========================  =========================================
+
+Only ``/tcrctl/step`` and ``/tcrctl/event`` are the record of truth; all other topics are derived from them
+for viewers (channel metadata ``derived = true``) and rounded to 2^-20 m. A file without a footer is an
+unfinished run: :func:`tcrctl.log.reader.read_log` reads it up to the last flush,
+:func:`tcrctl.log.recover.recover` mends it.
+"""

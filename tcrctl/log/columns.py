@@ -1,0 +1,128 @@
+"""Steps as columns: one array per quantity, named after its path in the record.
+
+``estimate.position`` of :class:`tcrctl.signals.StepRecord` is column ``estimate_position`` with shape
+(n_steps, 3); ``truth.q`` is ``truth_q``, and so on for every field of every record. Units are those of the
+record, all SI (:data:`COLUMNS`). Where a step has no value (no normal in position-only tracking, fewer
+prediction instants than others) floats are NaN, bools False. Columns of
+``truth`` exist only if a step has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcrctl.errors import UnknownNameError
+from tcrctl.log.schema import MESSAGES
+from tcrctl.signals import StepRecord
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One quantity of a step.
+
+    Attributes:
+        path: Dotted path in the record.
+        kind: Kind of :class:`tcrctl.log.schema.Field`.
+        unit: Unit; empty if there is none.
+        width: Last dimension of a two-dimensional quantity, else 0.
+    """
+
+    path: str
+    kind: str
+    unit: str
+    width: int
+
+    @property
+    def field(self) -> str:
+        """Last part of the path."""
+        return self.path.rpartition(".")[2]
+
+
+def _columns(message: str = "Step", prefix: str = "") -> dict[str, Column]:
+    found: dict[str, Column] = {}
+    for field in MESSAGES[message]:
+        path = prefix + field.name
+        if field.kind in MESSAGES:
+            found |= _columns(field.kind, path + ".")
+        else:
+            found[path.replace(".", "_")] = Column(path, field.kind, field.unit, field.width)
+    return found
+
+
+COLUMNS: Final = _columns()
+"""Every column by name."""
+
+_DTYPES: Final[dict[str, Any]] = {
+    "double": np.float64,
+    "double[]": np.float64,
+    "float[]": np.float32,
+    "bool": np.bool_,
+    "bool[]": np.bool_,
+    "uint64": np.int64,
+    "int64": np.int64,
+}
+
+
+def stack(steps: Iterable[StepRecord], names: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
+    """Stack steps into columns.
+
+    Args:
+        steps: The steps.
+        names: Which columns; all if None.
+
+    Returns:
+        Array by column name, first axis = step.
+
+    Raises:
+        UnknownNameError: If a name is not in ``COLUMNS``.
+    """
+    wanted = list(COLUMNS) if names is None else list(names)
+    for name in wanted:
+        if name not in COLUMNS:
+            raise UnknownNameError("log column", name, list(COLUMNS))
+    values: dict[str, list[Any]] = {name: [] for name in wanted}
+    getters = {name: attrgetter(COLUMNS[name].path) for name in wanted}
+    for step in steps:
+        for name, get in getters.items():
+            absent = step.truth is None and name.startswith("truth_")
+            values[name].append(None if absent else get(step))
+    return {
+        name: _stacked(COLUMNS[name], column)
+        for name, column in values.items()
+        if not name.startswith("truth_") or any(value is not None for value in column)
+    }
+
+
+def _stacked(column: Column, values: list[Any]) -> NDArray[Any]:
+    if column.kind == "string":
+        return np.array(values, dtype=np.str_)
+    dtype = _DTYPES[column.kind]
+    if not column.kind.endswith("[]"):
+        return np.array(values, dtype=dtype)
+    missing: NDArray[Any] = np.zeros((0, column.width) if column.width else 0, dtype)
+    arrays = [missing if value is None else value for value in values]
+    lengths = {len(array) for array in arrays}
+    if len(lengths) == 1 and lengths != {0}:
+        return np.stack(arrays)
+    return _padded(arrays, max(lengths, default=0), _longest_empty(column), dtype)
+
+
+def _longest_empty(column: Column) -> tuple[int, ...]:
+    """Shape of a quantity no step has: a normal has three components even then."""
+    if column.field == "normal":
+        return (3,)
+    return (0, column.width) if column.width else (0,)
+
+
+def _padded(arrays: list[NDArray[Any]], length: int, least: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    shape = (max(length, least[0]), *least[1:])
+    result = np.full((len(arrays), *shape), False if dtype is np.bool_ else np.nan, dtype)
+    for row, array in zip(result, arrays, strict=True):
+        row[: len(array)] = array
+    return result

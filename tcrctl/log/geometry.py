@@ -1,0 +1,93 @@
+"""What the log must know of the robot to name its columns and to draw it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcrctl.signals import Array
+
+NODES_PER_MODULE = 4
+NODE_LABELS = ("n1", "n2", "n3", "apex")
+
+
+@dataclass(frozen=True, slots=True)
+class CableRoute:
+    """Name and path of one cable, from the base to the ring it ends on.
+
+    Attributes:
+        name: Name of the cable.
+        nodes: Rows of the three ring nodes that carry each hole (n_holes, 3).
+        weights: Weights of these nodes for the hole's position, (2) (n_holes, 3).
+    """
+
+    name: str
+    nodes: NDArray[np.int64]
+    weights: Array
+
+    def points(self, nodes: Array) -> Array:
+        """Hole positions (n_holes, 3) [m] for node positions ``nodes`` (n_nodes, 3) [m]."""
+        hole: Array = np.einsum("hj,hjx->hx", self.weights, nodes[self.nodes])
+        return hole
+
+
+@dataclass(frozen=True, slots=True)
+class LogGeometry:
+    """Names and topology, in the node order of the notation table (:mod:`tcrctl`).
+
+    Attributes:
+        n_modules: Modules below the fixed base; the robot has ``4 (n_modules + 1)`` nodes.
+        cables: One route per cable, in the order of ``drive``.
+        marker_nodes: Row of the node that each row of ``Measurement.nodes`` measures (n_markers,).
+        tip_ring: Module whose ring is the end of eq. (11).
+        full_scale_tension: Tension drawn in full red [N]; a slack cable is blue.
+
+    Raises:
+        ValueError: If a node row or the tip ring does not exist.
+    """
+
+    n_modules: int
+    cables: tuple[CableRoute, ...]
+    marker_nodes: tuple[int, ...]
+    tip_ring: int
+    full_scale_tension: float = 20.0
+
+    def __post_init__(self) -> None:
+        rows = [*self.marker_nodes, *(int(row) for cable in self.cables for row in cable.nodes.ravel())]
+        if any(not 0 <= row < self.n_nodes for row in rows) or not 0 <= self.tip_ring <= self.n_modules:
+            raise ValueError(f"geometry names a node or ring beyond module {self.n_modules}")
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, base included."""
+        return NODES_PER_MODULE * (self.n_modules + 1)
+
+    @property
+    def ring_names(self) -> tuple[str, ...]:
+        """``base, m1, m2, ...``: names of the modules, also of the ring frames on ``/tf``."""
+        return ("base", *(f"m{i}" for i in range(1, self.n_modules + 1)))
+
+    @property
+    def node_names(self) -> tuple[str, ...]:
+        """``base.n1, base.n2, ..., m1.apex, ...`` in row order."""
+        return tuple(f"{ring}.{label}" for ring in self.ring_names for label in NODE_LABELS)
+
+    @property
+    def marker_names(self) -> tuple[str, ...]:
+        """Node names of the measured nodes, in the order of ``Measurement.nodes``."""
+        names = self.node_names
+        return tuple(names[row] for row in self.marker_nodes)
+
+    @property
+    def cable_names(self) -> tuple[str, ...]:
+        """Cable names in the order of ``drive``."""
+        return tuple(cable.name for cable in self.cables)
+
+    @property
+    def rods(self) -> NDArray[np.int64]:
+        """Node rows of the rods from ring to apex (3 (n_modules + 1), 2)."""
+        first = NODES_PER_MODULE * np.arange(self.n_modules + 1)[:, None]
+        ends = np.stack([first + np.arange(3), np.broadcast_to(first + 3, (self.n_modules + 1, 3))], axis=-1)
+        return ends.reshape(-1, 2)

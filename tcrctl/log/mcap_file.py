@@ -1,0 +1,138 @@
+"""Layout of one log file: what is written, in which order. Owned by one thread at a time."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from typing import IO, Any, Final
+
+from foxglove_schemas_protobuf.Log_pb2 import Log as FoxgloveLog
+from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
+
+from tcrctl import __version__
+from tcrctl.log.codec import encode
+from tcrctl.log.event import LEVELS, Event
+from tcrctl.log.geometry import LogGeometry
+from tcrctl.log.schema import VERSION, descriptor_set, public_descriptor, units
+from tcrctl.log.viewer_topics import TOPICS, ViewerTopics, stamp
+from tcrctl.signals import StepRecord
+
+START: Final = "tcrctl.run.start"
+STOP: Final = "tcrctl.run.stop"
+STEP_TOPIC: Final = "/tcrctl/step"
+EVENT_TOPIC: Final = "/tcrctl/event"
+LOG_TOPIC: Final = "/log"
+LIBRARY: Final = f"tcrctl/{__version__} {LIBRARY_IDENTIFIER}"
+
+Attachments = Mapping[str, tuple[str, bytes]]
+
+
+def new_mcap(stream: IO[bytes]) -> Writer:
+    """Writer with the header of our logs, zstd chunks of at most 1 MiB."""
+    writer = Writer(stream, compression=CompressionType.ZSTD)
+    writer.start(profile="", library=LIBRARY)
+    return writer
+
+
+class McapFile:
+    """Writes header, attachments and start metadata when made; then steps and events; last the stop."""
+
+    def __init__(
+        self,
+        stream: IO[bytes],
+        *,
+        attachments: Attachments,
+        start: Mapping[str, str],
+        geometry: LogGeometry,
+        epoch_ns: int,
+        period_s: float,
+    ) -> None:
+        """Write everything that is known before the first step; see :class:`tcrctl.log.writer.LogWriter`."""
+        self._stream, self._epoch_ns = stream, epoch_ns
+        self._viewer = ViewerTopics(geometry, period_s)
+        self._writer: Any = new_mcap(stream)
+        for name, (media_type, data) in attachments.items():
+            self._writer.add_attachment(epoch_ns, epoch_ns, name, media_type, data)
+        own = {"log_schema": VERSION, "epoch_ns": str(epoch_ns), "period_s": repr(period_s)}
+        self._writer.add_metadata(START, {**start, **own})
+        self._schemas: dict[str, int] = {}
+        self._channels = self._register(geometry)
+        self._events = 0
+        self.steps = 0
+        self.unflushed = 0
+        self.flush()
+
+    def _register(self, geometry: LogGeometry) -> dict[str, int]:
+        names = {
+            "nodes": ",".join(geometry.node_names),
+            "cables": ",".join(geometry.cable_names),
+            "markers": ",".join(geometry.marker_names),
+        }
+        step_units = {f"unit.{path}": unit for path, unit in units().items()}
+        channels = {
+            STEP_TOPIC: self._channel(STEP_TOPIC, public_descriptor("Step"), {**names, **step_units}),
+            EVENT_TOPIC: self._channel(EVENT_TOPIC, public_descriptor("Event"), {"unit.t": "s"}),
+            LOG_TOPIC: self._channel(LOG_TOPIC, FoxgloveLog.DESCRIPTOR, {"derived": "true"}),
+        }
+        for topic, message in TOPICS.items():
+            shared = {"derived": "true", "shape": "truth if simulated, else estimate", "unit": "m"}
+            channels[topic] = self._channel(topic, message.DESCRIPTOR, shared)
+        return channels
+
+    def _channel(self, topic: str, descriptor: Any, metadata: dict[str, str]) -> int:
+        name = descriptor.full_name
+        if name not in self._schemas:
+            self._schemas[name] = self._writer.register_schema(name, "protobuf", descriptor_set(descriptor))
+        number: int = self._writer.register_channel(topic, "protobuf", self._schemas[name], metadata)
+        return number
+
+    def time_ns(self, t: float) -> int:
+        """Unix nanoseconds of time ``t`` [s] of the run.
+
+        Raises:
+            ValueError: If ``t`` is not finite or outside what the file can hold.
+        """
+        if not math.isfinite(t) or not 0 <= (time := self._epoch_ns + round(t * 1e9)) < 2**64:
+            raise ValueError(f"t = {t} s is not a time the log can hold")
+        return time
+
+    def step(self, record: StepRecord) -> None:
+        """Write a step and the viewer topics due at it."""
+        now = self.time_ns(record.t)
+        try:
+            measured = self.time_ns(record.measurement.t)
+        except ValueError:  # nothing measured yet: the field keeps the value, the index needs a number
+            measured = now
+        self._add(STEP_TOPIC, now, encode("Step", record), record.k, measured)
+        for topic, data in self._viewer.messages(record, now):
+            self._add(topic, now, data, record.k, now)
+        self.steps += 1
+        self.unflushed += 1
+
+    def event(self, event: Event) -> None:
+        """Write an event for machines and for the log panel of viewers."""
+        now = self.time_ns(event.t)
+        self._add(EVENT_TOPIC, now, encode("Event", event), self._events, now)
+        level: Any = LEVELS[event.level]
+        line = FoxgloveLog(timestamp=stamp(now), level=level, message=event.message, name=event.kind)
+        self._add(LOG_TOPIC, now, line.SerializeToString(), self._events, now)
+        self._events += 1
+        self.unflushed += 1
+
+    def _add(self, topic: str, log_time: int, data: bytes, sequence: int, publish_time: int) -> None:
+        self._writer.add_message(self._channels[topic], log_time, data, publish_time, sequence % 2**32)
+
+    def flush(self, *, to_disk: bool = False) -> None:
+        """End the chunk and hand it to the operating system, and to the disk if ``to_disk``."""
+        self._writer.flush()
+        if to_disk:
+            getattr(os, "fdatasync", os.fsync)(self._stream.fileno())
+        self.unflushed = 0
+
+    def finish(self, stop: Mapping[str, str]) -> None:
+        """Write the stop record, index and footer; ``steps`` is added to the record."""
+        self._writer.flush()
+        self._writer.add_metadata(STOP, {"steps": str(self.steps), **stop})
+        self._writer.finish()
+        self._stream.flush()

@@ -1,0 +1,155 @@
+"""Reading a log back, finished or not."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from google.protobuf.message import DecodeError
+from mcap.reader import SeekingReader
+from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata
+from numpy.typing import NDArray
+
+from tcrctl.errors import InputError, LogError
+from tcrctl.log.codec import decode_event, decode_step
+from tcrctl.log.event import Event
+from tcrctl.log.mcap_file import EVENT_TOPIC, START, STEP_TOPIC, STOP
+from tcrctl.log.scan import Scan, check_is_mcap
+from tcrctl.signals import StepRecord
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """One log file; the steps stay on disk until asked for.
+
+    Attributes:
+        path: The file.
+        start: Metadata ``tcrctl.run.start``.
+        stop: Metadata ``tcrctl.run.stop``, or None if the run was not finished.
+        attachments: Media type and content by name, in file order.
+        complete: The file has its stop record and its footer; nothing is missing.
+        node_names: Names of the rows of ``q``, ``base.n1, ...``; empty if no step was flushed.
+        cable_names: Names of the entries of ``drive``; empty as above.
+        marker_names: Names of the rows of ``Measurement.nodes``; empty as above.
+    """
+
+    path: Path
+    start: dict[str, str]
+    stop: dict[str, str] | None
+    attachments: dict[str, tuple[str, bytes]]
+    complete: bool
+    node_names: tuple[str, ...]
+    cable_names: tuple[str, ...]
+    marker_names: tuple[str, ...]
+
+    def steps(self) -> Iterator[StepRecord]:
+        """Yield every step that is whole, in the order written, with arrays equal bit for bit.
+
+        Raises:
+            LogError: If the file is damaged inside, or a step is not one of this schema.
+        """
+        for message in self._messages(STEP_TOPIC):
+            try:
+                yield decode_step(message.data)
+            except (DecodeError, ValueError) as error:
+                raise LogError(self.path, f"step {message.sequence} cannot be decoded: {error}") from error
+
+    def events(self) -> Iterator[Event]:
+        """Yield every event, in the order written.
+
+        Raises:
+            LogError: As :meth:`steps`.
+        """
+        for message in self._messages(EVENT_TOPIC):
+            try:
+                yield decode_event(message.data)
+            except (DecodeError, ValueError) as error:
+                raise LogError(self.path, f"event {message.sequence} cannot be decoded: {error}") from error
+
+    def columns(self, names: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
+        """One array per quantity, first axis = step; see :mod:`tcrctl.log.columns` for names and units.
+
+        Args:
+            names: Which ones; all if None.
+
+        Raises:
+            UnknownNameError: If a name does not exist.
+            LogError: As :meth:`steps`.
+        """
+        from tcrctl.log.columns import stack
+
+        return stack(self.steps(), names)
+
+    def _messages(self, topic: str) -> Iterator[Message]:
+        scan = Scan(self.path)
+        channels: set[int] = set()
+        for record in scan:
+            if isinstance(record, Channel) and record.topic == topic:
+                channels.add(record.id)
+            elif isinstance(record, Message) and record.channel_id in channels:
+                yield record
+        if self.complete and (scan.damaged_chunks or not scan.reached_end):
+            hint = f"Save the undamaged steps: tcrctl recover {self.path}"
+            raise LogError(self.path, f"is damaged: {scan.damaged_chunks} chunks cannot be read", hint=hint)
+
+
+def read_log(path: str | os.PathLike[str]) -> Log:
+    """Open a log.
+
+    Args:
+        path: An MCAP file written by :class:`tcrctl.log.writer.LogWriter`; it may end anywhere.
+
+    Returns:
+        The log, with ``complete`` False if the file has no footer or no stop record.
+
+    Raises:
+        InputError: If the file does not exist, or is not a log of tcrctl.
+    """
+    path = Path(path)
+    check_is_mcap(path)
+    records, indexed = _indexed_records(path), True
+    if records is None:
+        records, indexed = list(_cut_records(path)), False
+    metadata = {record.name: record.metadata for record in records if isinstance(record, Metadata)}
+    header = next((record for record in records if isinstance(record, Header)), None)
+    if START not in metadata and not (header and header.library.startswith("tcrctl/")):
+        raise InputError(f"{path}: is an MCAP file, but not a log of tcrctl")
+    names = next((c.metadata for c in records if isinstance(c, Channel) and c.topic == STEP_TOPIC), {})
+    return Log(
+        path=path,
+        start=metadata.get(START, {}),
+        stop=metadata.get(STOP),
+        attachments={a.name: (a.media_type, a.data) for a in records if isinstance(a, Attachment)},
+        complete=indexed and STOP in metadata,
+        node_names=_split(names.get("nodes", "")),
+        cable_names=_split(names.get("cables", "")),
+        marker_names=_split(names.get("markers", "")),
+    )
+
+
+def _split(names: str) -> tuple[str, ...]:
+    return tuple(names.split(",")) if names else ()
+
+
+def _indexed_records(path: Path) -> list[McapRecord] | None:
+    """Header, metadata, attachments and channels by way of the footer's index; None if there is none."""
+    try:
+        with open(path, "rb") as stream:
+            reader = SeekingReader(stream, record_size_limit=os.fstat(stream.fileno()).st_size)
+            summary = reader.get_summary()
+            if summary is None:
+                return None
+            found: list[McapRecord] = [reader.get_header(), *reader.iter_metadata()]
+            return [*found, *reader.iter_attachments(), *summary.channels.values()]
+    except Exception:  # what a cut file makes the reader raise has no common base
+        return None
+
+
+def _cut_records(path: Path) -> Iterator[McapRecord]:
+    """Header, metadata, attachments and channels of a file without index."""
+    for record in Scan(path):
+        if isinstance(record, Header | Metadata | Attachment | Channel):
+            yield record

@@ -1,0 +1,142 @@
+"""Topics derived from a step for viewers: frames, end poses, backbone and a 3-D scene.
+
+Nothing here is data: coordinates are rounded to 2^-20 m, which is far below what a screen shows and lets the
+compressor remove most of them. Where a shape is not finite (a diverged or unseen robot), nothing is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from tcrctl.log.geometry import NODES_PER_MODULE, LogGeometry
+from tcrctl.log.ring_frames import finite, quaternion_of_normal, ring_frames
+from tcrctl.log.scene import Scene
+from tcrctl.signals import Array, Measurement, Reference, StepRecord
+
+WORLD: Final = "world"
+TOPICS: Final[dict[str, Any]] = {
+    "/tf": FrameTransforms,
+    "/tip/measured": PoseInFrame,
+    "/tip/reference": PoseInFrame,
+    "/backbone": PosesInFrame,
+    "/scene": SceneUpdate,
+}
+VIEWER_RATE_HZ: Final = 60.0
+SCENE_RATE_HZ: Final = 10.0
+
+
+def stride(period: float, rate_hz: float) -> int:
+    """Steps between two messages so that no more than ``rate_hz`` of them appear per second."""
+    return max(1, int(np.ceil(1.0 / (rate_hz * period) - 1e-9)))
+
+
+def stamp(time_ns: int) -> Timestamp:
+    """Protobuf timestamp of an instant in Unix nanoseconds."""
+    seconds, nanos = divmod(time_ns, 1_000_000_000)
+    return Timestamp(seconds=seconds, nanos=nanos)
+
+
+def rounded(values: Array) -> list[list[float]]:
+    """Rows of ``values`` in multiples of 2^-20."""
+    rows: list[list[float]] = (np.round(values * 2.0**20) / 2.0**20).tolist()
+    return rows
+
+
+class ViewerTopics:
+    """Makes the messages of the derived topics.
+
+    Shape and tensions are those of the simulated truth where a step has it, else of the estimate.
+    """
+
+    def __init__(self, geometry: LogGeometry, period: float) -> None:
+        """Prepare for steps of ``period`` [s] of a robot with this ``geometry``."""
+        self._geometry = geometry
+        self._viewer_stride = stride(period, VIEWER_RATE_HZ)
+        self._scene_stride = stride(period, SCENE_RATE_HZ)
+        self._scene = Scene(geometry)
+        marker_of = {node: row for row, node in enumerate(geometry.marker_nodes)}
+        tip = [NODES_PER_MODULE * geometry.tip_ring + j for j in range(3)]
+        self._tip_markers = (
+            [marker_of[node] for node in tip] if all(node in marker_of for node in tip) else None
+        )
+
+    def messages(self, record: StepRecord, time_ns: int) -> Iterator[tuple[str, bytes]]:
+        """Topic and encoded message of everything due at this step, whose log time is ``time_ns``."""
+        if record.k % self._viewer_stride == 0:
+            yield from self._poses(record, stamp(time_ns))
+        if record.k % self._scene_stride == 0:
+            shape, tension = _shape(record), _tension(record)
+            if shape.size == 3 * self._geometry.n_nodes and finite(shape):
+                yield "/scene", self._scene.encode(shape.reshape(-1, 3), tension, stamp(time_ns))
+
+    def _poses(self, record: StepRecord, when: Timestamp) -> Iterator[tuple[str, bytes]]:
+        shape = _shape(record)
+        if shape.size == 3 * self._geometry.n_nodes:
+            centre, turn = ring_frames(shape.reshape(-1, NODES_PER_MODULE, 3)[:, :3])
+            if finite(centre, turn):
+                yield "/tf", self._frames(centre, turn, when)
+                yield "/backbone", _backbone(centre, turn, when)
+        measured = self._measured(record.measurement)
+        if measured is not None:
+            yield "/tip/measured", _pose(*measured, when)
+        reference = _reference(record.reference)
+        if reference is not None:
+            yield "/tip/reference", _pose(*reference, when)
+
+    def _frames(self, centre: Array, turn: Array, when: Timestamp) -> bytes:
+        message = FrameTransforms()
+        names = self._geometry.ring_names
+        for name, (x, y, z), (i, j, k, w) in zip(names, rounded(centre), rounded(turn), strict=True):
+            frame = message.transforms.add(parent_frame_id=WORLD, child_frame_id=name, timestamp=when)
+            frame.translation.x, frame.translation.y, frame.translation.z = x, y, z
+            frame.rotation.x, frame.rotation.y, frame.rotation.z, frame.rotation.w = i, j, k, w
+        return message.SerializeToString()
+
+    def _measured(self, measurement: Measurement) -> tuple[Array, Array] | None:
+        """Pose of the end ring from its three markers, None if one of them was not seen."""
+        rows = self._tip_markers
+        if rows is None or max(rows) >= len(measurement.nodes) or not measurement.valid[rows].all():
+            return None
+        centre, turn = ring_frames(measurement.nodes[rows].astype(np.float64)[None])
+        return (centre[0], turn[0]) if finite(centre, turn) else None
+
+
+def _shape(record: StepRecord) -> Array:
+    return record.estimate.q if record.truth is None else record.truth.q
+
+
+def _tension(record: StepRecord) -> Array:
+    return record.estimate.tension if record.truth is None else record.truth.tension
+
+
+def _reference(reference: Reference) -> tuple[Array, Array] | None:
+    normal = np.array([0.0, 0.0, 1.0]) if reference.normal is None else reference.normal
+    if reference.position.size != 3 or normal.size != 3 or not finite(reference.position, normal):
+        return None
+    return reference.position, quaternion_of_normal(normal)
+
+
+def _pose(position: Array, turn: Array, when: Timestamp) -> bytes:
+    message = PoseInFrame(timestamp=when, frame_id=WORLD)
+    _set_pose(message.pose, *rounded(position[None]), *rounded(turn[None]))
+    return message.SerializeToString()
+
+
+def _backbone(centre: Array, turn: Array, when: Timestamp) -> bytes:
+    message = PosesInFrame(timestamp=when, frame_id=WORLD)
+    for position, rotation in zip(rounded(centre), rounded(turn), strict=True):
+        _set_pose(message.poses.add(), position, rotation)
+    return message.SerializeToString()
+
+
+def _set_pose(pose: Any, position: list[float], turn: list[float]) -> None:
+    pose.position.x, pose.position.y, pose.position.z = position
+    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = turn

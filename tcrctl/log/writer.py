@@ -1,0 +1,231 @@
+"""The log as the control loop sees it: hand over a record, never wait for a disk.
+
+control thread -- step(record) --> queue --> writer thread: encode, compress, flush --> file
+
+Only the writer thread touches the file once the constructor has returned.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import BinaryIO, Final, Self
+
+from tcrctl.errors import LogError
+from tcrctl.log.event import Event
+from tcrctl.log.geometry import LogGeometry
+from tcrctl.log.mcap_file import Attachments, McapFile
+from tcrctl.signals import StepRecord
+
+_QUEUE_S: Final = 2.0  # a writer that lags further behind will not catch up: the disk is too slow
+_QUEUE_MIN_STEPS: Final = 1000
+_POLL_S: Final = 1.0  # how often an idle writer looks whether the main thread still lives
+
+
+def open_new(path: Path) -> BinaryIO:
+    """Open a file for writing that must not exist yet."""
+    return open(path, "xb")
+
+
+class LogWriter:
+    """Writes one log; a context manager.
+
+    The file is created, and its attachments and start metadata written, before the constructor returns: a bad
+    folder is found before the robot moves. From then on a writer thread owns the file. Whatever ends the
+    ``with`` body, the file gets a stop record; without one (kill -9, power cut) it is readable up to the last
+    flush.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        attachments: Attachments,
+        start: Mapping[str, str],
+        geometry: LogGeometry,
+        epoch_ns: int,
+        period_s: float,
+        flush_s: float = 0.5,
+        flush_steps: int = 500,
+        fsync: bool = False,
+        wait_when_full: bool = False,
+        opener: Callable[[Path], BinaryIO] = open_new,
+    ) -> None:
+        """Create the log.
+
+        Args:
+            path: File to create; it must not exist.
+            attachments: Media type and content by file name, in the order in which they are written.
+            start: Metadata ``tcrctl.run.start``; schema version, epoch and period are added.
+            geometry: Names and topology of the robot.
+            epoch_ns: Unix time of t = 0 [ns].
+            period_s: Control period [s].
+            flush_s: A step is flushed at most this long after it was logged [s].
+            flush_steps: At most this many steps are unflushed.
+            fsync: Also wait at every flush until the disk has it (survives a power cut).
+            wait_when_full: Let :meth:`step` wait while the queue is full, instead of failing; for runs that
+                no clock paces.
+            opener: Opens the file.
+
+        Raises:
+            LogError: If the file cannot be created; nothing is left behind.
+        """
+        self.path = Path(path)
+        self._flush_s, self._flush_steps, self._fsync = flush_s, flush_steps, fsync
+        self._wait_when_full = wait_when_full
+        self._limit = max(_QUEUE_MIN_STEPS, math.ceil(_QUEUE_S / period_s))
+        self._queue: SimpleQueue[StepRecord | Event | dict[str, str]] = SimpleQueue()
+        self._failure: Exception | None = None
+        self._finished = False
+        self._stream = _create(self.path, opener)
+        try:
+            self._file = McapFile(
+                self._stream,
+                attachments=attachments,
+                start=start,
+                geometry=geometry,
+                epoch_ns=epoch_ns,
+                period_s=period_s,
+            )
+        except Exception as error:
+            with suppress(OSError):
+                self._stream.close()
+            self.path.unlink(missing_ok=True)
+            raise LogError(self.path, f"cannot be written: {error}") from error
+        self._thread = threading.Thread(target=self._run, name="tcrctl-log", daemon=False)
+        self._thread.start()
+
+    def step(self, record: StepRecord) -> None:
+        """Log a step: puts the record in a queue and returns. The arrays must not be changed afterwards.
+
+        Raises:
+            LogError: If the writer thread failed (disk full), is too slow, or the log is finished.
+        """
+        self._check()
+        if self._queue.qsize() >= self._limit:
+            self._overflow()
+        self._queue.put(record)
+
+    def event(self, t: float, kind: str, level: str, message: str) -> None:
+        """Log an event at time ``t`` [s]; see :class:`tcrctl.log.event.Event`.
+
+        Raises:
+            LogError: As :meth:`step`.
+            ValueError: If the level is unknown.
+        """
+        self._check()
+        self._queue.put(Event(t, kind, level, message))
+
+    def finish(self, stop: Mapping[str, str]) -> None:
+        """Write everything logged so far and metadata ``tcrctl.run.stop``, and close the file.
+
+        Raises:
+            LogError: If something of it could not be written; what was flushed stays readable.
+        """
+        self._check()
+        self._finished = True
+        self._queue.put(dict(stop))
+        self._thread.join()
+        if self._failure is not None:
+            raise self._error(self._failure) from self._failure
+
+    def __enter__(self) -> Self:
+        """Return the writer."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Finish the log if :meth:`finish` was not called, with status ``error`` or ``aborted``."""
+        if self._finished:
+            return
+        if error is None:
+            self.finish({"status": "error", "reason": "the run ended without a result"})
+            return
+        status = "error" if isinstance(error, Exception) else "aborted"
+        try:
+            self.finish({"status": status, "reason": f"{type(error).__name__}: {error}"})
+        except LogError as failure:
+            if not isinstance(error, LogError):
+                error.add_note(f"the log could not be finished: {failure}")
+
+    def _check(self) -> None:
+        if self._failure is not None:
+            raise self._error(self._failure) from self._failure
+        if self._finished:
+            raise LogError(self.path, "is finished; nothing can be added")
+
+    def _error(self, failure: Exception) -> LogError:
+        hint = f"Everything up to the last flush is readable: tcrctl recover {self.path}"
+        return LogError(self.path, f"writing failed: {failure}", hint=hint)
+
+    def _overflow(self) -> None:
+        while self._wait_when_full and self._queue.qsize() >= self._limit:
+            time.sleep(0.001)
+            self._check()
+        if not self._wait_when_full:
+            text = f"the disk is too slow: {self._limit} steps are waiting to be written"
+            raise LogError(self.path, text, hint="Log to a faster disk or lower the control rate.")
+
+    def _run(self) -> None:
+        """Body of the writer thread."""
+        try:
+            self._write_until_stop()
+        except Exception as failure:
+            self._failure = failure
+        try:
+            self._stream.close()
+        except OSError as failure:
+            self._failure = self._failure or failure
+
+    def _write_until_stop(self) -> None:
+        flush_at = math.inf
+        while True:
+            item = self._next(flush_at)
+            if isinstance(item, dict):
+                self._file.finish(item)
+                if self._fsync:
+                    os.fsync(self._stream.fileno())
+                return
+            if isinstance(item, StepRecord):
+                self._file.step(item)
+            elif isinstance(item, Event):
+                self._file.event(item)
+            flush_at = self._flush_if_due(flush_at)
+
+    def _next(self, flush_at: float) -> StepRecord | Event | dict[str, str] | None:
+        """Next item; None if a flush is due or nothing came for a while."""
+        wait = min(_POLL_S, max(0.0, flush_at - time.monotonic()))
+        try:
+            return self._queue.get(timeout=wait) if wait > 0.0 else self._queue.get_nowait()
+        except Empty:
+            if not self._finished and not threading.main_thread().is_alive():
+                return {"status": "error", "reason": "the program ended without finishing the log"}
+            return None
+
+    def _flush_if_due(self, flush_at: float) -> float:
+        """Flush if it is time to; return when the next flush is due on the monotonic clock [s]."""
+        if self._file.unflushed == 0:
+            return math.inf
+        now = time.monotonic()
+        if now >= flush_at or self._file.unflushed >= self._flush_steps:
+            self._file.flush(to_disk=self._fsync)
+            return math.inf
+        return min(flush_at, now + self._flush_s)
+
+
+def _create(path: Path, opener: Callable[[Path], BinaryIO]) -> BinaryIO:
+    try:
+        return opener(path)
+    except FileExistsError as error:
+        raise LogError(path, "exists already; a log is never overwritten") from error
+    except OSError as error:
+        text = f"cannot be created: {error.strerror or error}"
+        raise LogError(path, text, hint=f"Is {path.parent} a folder you may write to?") from error
