@@ -6,6 +6,7 @@ limit or divergence, 5 device, connection or file system, 130 Ctrl-C, 143 SIGTER
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -40,8 +41,10 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        """Return ``where: key: message``."""
-        return f"{self.where}: {self.key}: {self.message}" if self.key else f"{self.where}: {self.message}"
+        """Return ``where: key: message``, without the key where it would stand twice."""
+        if not self.key or self.where == f"--set {self.key}":
+            return f"{self.where}: {self.message}"
+        return f"{self.where}: {self.key}: {self.message}"
 
 
 class InputError(TcrctlError):
@@ -72,7 +75,9 @@ class UnknownNameError(InputError):
     """
 
     def __init__(self, kind: str, name: str, allowed: Sequence[str]) -> None:
-        super().__init__(f"there is no {kind} named {name!r}; known: {', '.join(allowed)}")
+        close = difflib.get_close_matches(name, allowed, n=1)
+        hint = f"Did you mean {close[0]}?" if close else ""
+        super().__init__(f"there is no {kind} named {name!r}; known: {', '.join(allowed)}", hint=hint)
         self.kind, self.name, self.allowed = kind, name, tuple(allowed)
 
 
@@ -87,9 +92,12 @@ class InfeasibleError(InputError):
         unit: Unit of value and limit.
     """
 
-    def __init__(self, time: float, quantity: str, value: float, limit: float, unit: str, *, hint: str = "") -> None:
+    def __init__(
+        self, time: float, quantity: str, value: float, limit: float, unit: str, *, hint: str = ""
+    ) -> None:
         super().__init__(
-            f"infeasible at t = {time:.3f} s: {quantity} is {value:.4g} {unit}, limit {limit:.4g} {unit}", hint=hint
+            f"infeasible at t = {time:.3f} s: {quantity} is {value:.4g} {unit}, limit {limit:.4g} {unit}",
+            hint=hint,
         )
         self.time, self.quantity, self.value, self.limit, self.unit = time, quantity, value, limit, unit
 
@@ -105,9 +113,10 @@ class NoEquilibriumError(InputError):
 
     def __init__(self, what: str, residual: float, tolerance: float, iterations: int) -> None:
         super().__init__(
-            f"no equilibrium found for {what}: largest nodal force {residual:.3g} N after {iterations} iterations, "
-            f"accepted {tolerance:.3g} N",
-            hint="Check spring stiffness, initial tension and cone height; a slack or buckled robot has no stable shape.",
+            f"no equilibrium found for {what}: largest nodal force {residual:.3g} N after {iterations} "
+            f"iterations, accepted {tolerance:.3g} N",
+            hint="Check spring stiffness, initial tension and cone height; "
+            "a slack or buckled robot has no stable shape.",
         )
         self.residual, self.tolerance, self.iterations = residual, tolerance, iterations
 

@@ -1,0 +1,110 @@
+"""The command ``tcrctl``: which verbs there are, and how every error becomes one line and one exit code."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Annotated
+
+import typer
+
+from tcrctl import __version__
+from tcrctl.cli.list import list_shipped
+from tcrctl.cli.new import new
+from tcrctl.cli.schema import schema
+from tcrctl.cli.show import show
+from tcrctl.cli.validate import validate
+from tcrctl.errors import DeviceError, SpecError, TcrctlError
+
+VERBS: dict[str, Callable[..., None]] = {
+    "list": list_shipped,
+    "show": show,
+    "validate": validate,
+    "new": new,
+    "schema": schema,
+}
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"tcrctl {__version__}")
+        raise typer.Exit()
+
+
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Experiments with cable-driven tensegrity continuum robots, simulated or on the bench.
+
+    Exit codes: 0 ok, 1 internal error, 2 wrong usage or input, 3 a criterion failed, 4 stopped by a safety
+    limit or divergence, 5 device, connection or file system, 130 Ctrl-C, 143 SIGTERM.
+    """
+
+
+def build_app() -> typer.Typer:
+    """Return the application with all verbs."""
+    app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode="rich")
+    app.callback()(_options)
+    for name, verb in VERBS.items():
+        app.command(name)(verb)
+    return app
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        arguments: Arguments after the program name; those of the process if left out.
+
+    Returns:
+        The exit code.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    as_json = "--json" in given
+    try:
+        build_app()(args=given, prog_name="tcrctl")
+    except SystemExit as end:  # how typer ends, always
+        if end.code == 2 and as_json:
+            said = getattr(end.__context__, "format_message", lambda: "wrong usage")
+            _print_json(str(said()))
+        return end.code if isinstance(end.code, int) else int(end.code is not None)
+    except KeyboardInterrupt:
+        return 130
+    except Exception as error:
+        return _report(_known(error), error, as_json)
+    return 0
+
+
+def _known(error: Exception) -> TcrctlError:
+    if isinstance(error, TcrctlError):
+        return error
+    if isinstance(error, OSError):
+        return DeviceError(str(error))
+    hint = "Set TCRCTL_TRACEBACK=1 for the traceback; this is a fault of the program, please report it."
+    return TcrctlError(f"internal error: {type(error).__name__}: {error}", hint=hint)
+
+
+def _report(error: TcrctlError, raised: Exception, as_json: bool) -> int:
+    if os.environ.get("TCRCTL_TRACEBACK"):
+        traceback.print_exception(raised)
+    problems = [str(problem) for problem in error.problems] if isinstance(error, SpecError) else []
+    for line in problems or [str(error)]:
+        print(f"error: {line}", file=sys.stderr)
+    if error.hint:
+        print(f"hint: {error.hint}", file=sys.stderr)
+    if as_json:
+        _print_json(str(error), problems)
+    return error.exit_code
+
+
+def _print_json(reason: str, problems: Sequence[str] = ()) -> None:
+    print(json.dumps({"status": "error", "reason": reason, **({"problems": problems} if problems else {})}))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

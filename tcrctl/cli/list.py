@@ -1,0 +1,52 @@
+"""``tcrctl list``: what comes with the program."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tcrctl.cli.options import AsJson
+
+
+def list_shipped(as_json: AsJson = False) -> None:
+    r"""List the shipped experiments and robots.
+
+    \b
+    Examples:
+      tcrctl list
+      tcrctl list --json | jq -r '.experiments[].name'
+    """
+    from tcrctl import shipped
+
+    experiments = [
+        _entry(name, path, ("description", "robot", "source")) for name, path in shipped.experiments().items()
+    ]
+    robots = [_entry(name, path, ("description",)) for name, path in shipped.robots().items()]
+    if as_json:
+        print(json.dumps({"experiments": experiments, "robots": robots}))
+        return
+    _print_table(("EXPERIMENT", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), experiments)
+    print()
+    _print_table(("ROBOT", "DESCRIPTION"), ("name", "description"), robots)
+
+
+def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:
+    """Return some text values of a file that may be invalid, without validating it."""
+    from tcrctl import strict_yaml
+    from tcrctl.errors import InputError
+
+    try:
+        data = strict_yaml.load(path).data
+    except InputError:
+        data = None
+    values = data if isinstance(data, dict) else {"description": f"not readable; see: tcrctl validate {path}"}
+    return {"name": name, **{key: str(values.get(key) or "") for key in keys}, "path": str(path)}
+
+
+def _print_table(titles: Sequence[str], keys: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+    cells = [list(titles), *([row[key] for key in keys] for row in rows)]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(keys))]
+    for row in cells:
+        print("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())

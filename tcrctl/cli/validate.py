@@ -1,0 +1,47 @@
+"""``tcrctl validate SPEC...``: everything that is wrong with files, all at once."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from tcrctl.cli.options import AsJson, IsRobot, Overrides
+
+
+def validate(
+    specs: Annotated[list[str], typer.Argument(metavar="SPEC...", help="Shipped names or YAML files.")],
+    overrides: Overrides = None,
+    robot: IsRobot = False,
+    as_json: AsJson = False,
+) -> None:
+    r"""Check experiment files without running them; exit code 2 if there is a problem.
+
+    \b
+    Examples:
+      tcrctl validate my_experiment.yaml
+      tcrctl validate letter_t --set controller.horizon_s=0.3
+      tcrctl validate --robot my_robot.yaml
+    """
+    from tcrctl.errors import InputError, Problem, SpecError
+    from tcrctl.robot.description import load_robot
+    from tcrctl.spec import load_spec
+
+    problems: list[Problem] = []
+    valid: list[str] = []
+    for name in specs:
+        try:
+            load_robot(name, overrides=overrides or ()) if robot else load_spec(name, overrides or ())
+            valid.append(name)
+        except SpecError as error:
+            problems += error.problems
+        except InputError as error:
+            problems.append(Problem(name, "", f"{error} {error.hint}".strip()))
+    if not as_json:
+        for name in valid:
+            print(f"{name}: ok")
+    if problems:
+        raise SpecError(list(dict.fromkeys(problems)))  # a bad --set is the same for all
+    if as_json:
+        print(json.dumps({"status": "ok", "valid": valid}))

@@ -1,0 +1,1 @@
+"""Controllers: estimate and reference -> drive speeds; chosen by ``controller.kind``."""

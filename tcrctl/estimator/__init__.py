@@ -1,0 +1,1 @@
+"""Estimators: measurement and applied command -> state of the robot model; chosen by ``estimator.kind``."""

@@ -1,0 +1,29 @@
+"""What an ``estimator:`` section may say, units in the key names."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field
+
+from tcrctl.settings import Settings, quantity
+
+
+class PassiveObserverSettings(Settings):
+    """Steps the model with the applied command, drawn to the measured rings by virtual springs."""
+
+    kind: Literal["passive_observer"]
+    stiffness_n_m: float = quantity(
+        "N/m", "virtual spring from every measured node to its measurement", 200.0, gt=0
+    )
+
+
+class ExactSettings(Settings):
+    """Passes the simulated plant's true state on; for studies on a simulated plant."""
+
+    kind: Literal["exact"]
+
+
+EstimatorSettings: TypeAlias = Annotated[
+    PassiveObserverSettings | ExactSettings, Field(discriminator="kind", description="state estimator")
+]

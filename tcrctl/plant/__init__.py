@@ -1,0 +1,1 @@
+"""Plants: what is controlled, simulated or real; chosen by ``plant.kind``."""

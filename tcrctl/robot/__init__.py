@@ -1,0 +1,1 @@
+"""The robot: description (YAML) -> frozen arrays -> equations of motion, equilibrium, modes."""

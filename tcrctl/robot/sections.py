@@ -1,0 +1,145 @@
+"""The sections of a robot file, each with units in its keys."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import Discriminator, Field, Tag
+
+from tcrctl.settings import Settings, quantity
+
+Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+NodeName: TypeAlias = Annotated[str, Field(pattern=r"^(base|m[1-9][0-9]*)\.(n1|n2|n3|apex)$")]
+JointNode: TypeAlias = Annotated[str, Field(pattern=r"^(upper|lower)\.(n1|n2|n3|apex)$")]
+Degrees: TypeAlias = Annotated[
+    float,
+    Field(
+        ge=-360, le=360, description="angle of the hole on the ring, from node n1, counter-clockwise [deg]"
+    ),
+]
+
+
+class ModuleSettings(Settings):
+    """The modules, all alike: a ring and an apex joined by three rods; the fixed base is one more."""
+
+    count: int = Field(description="number of moving modules", ge=1, le=200)
+    pitch_mm: float = quantity("mm", "distance between neighbouring ring planes", gt=0)
+    ring_diameter_mm: float = quantity("mm", "diameter of the ring through its three nodes", gt=0)
+    cone_height_mm: float = quantity("mm", "ring plane to apex", gt=0)
+    rod_diameter_mm: float = quantity("mm", "diameter of rods and ring sides", gt=0)
+    youngs_modulus_mpa: float = quantity("MPa", "Young's modulus of rods and ring sides", gt=0)
+    mass_g: float = quantity("g", "mass of one module", gt=0)
+    ring_mass_fraction: float = quantity(
+        "1", "part of the mass on the ring; the rest is on the rods", 0.5, ge=0, lt=1
+    )
+    damping_n_s_m: float = quantity("N s/m", "axial damping of rods and ring sides", 0.0, ge=0)
+
+
+class SpringBetween(Settings):
+    """A further spring; what is left out is as in ``springs``."""
+
+    nodes: tuple[NodeName, NodeName] = Field(
+        description="the nodes it joins, for instance [base.n1, m3.apex]"
+    )
+    youngs_modulus_mpa: float | None = quantity("MPa", "Young's modulus", None, gt=0)
+    diameter_mm: float | None = quantity("mm", "equivalent diameter", None, gt=0)
+    natural_length_mm: float | None = quantity("mm", "natural length", None, gt=0)
+    mass_g: float | None = quantity("g", "mass, on the two end nodes", None, ge=0)
+    damping_n_s_m: float | None = quantity("N s/m", "axial damping", None, ge=0)
+    tension_only: bool | None = Field(default=None, description="slack when shorter than its natural length")
+
+
+def _between_tag(value: Any) -> str:
+    return "(pair)" if isinstance(value, list | tuple) else "(map)"
+
+
+Between: TypeAlias = Annotated[
+    Annotated[tuple[NodeName, NodeName], Tag("(pair)")] | Annotated[SpringBetween, Tag("(map)")],
+    Discriminator(_between_tag),
+]
+
+
+class SpringSettings(Settings):
+    """The springs: values common to all, and which nodes they join."""
+
+    youngs_modulus_mpa: float = quantity("MPa", "Young's modulus", gt=0)
+    diameter_mm: float = quantity("mm", "equivalent diameter", gt=0)
+    natural_length_mm: float = quantity("mm", "natural length", gt=0)
+    mass_g: float = quantity("g", "mass of one spring, on its two end nodes", 0.0, ge=0)
+    damping_n_s_m: float = quantity("N s/m", "axial damping of one spring", 0.0, ge=0)
+    tension_only: bool = Field(default=True, description="slack when shorter than its natural length")
+    joint: tuple[tuple[JointNode, JointNode], ...] = Field(
+        default=(), description="node pairs joined between every module (upper) and the next one (lower)"
+    )
+    between: tuple[Between, ...] = Field(
+        default=(), description="further springs between any two named nodes"
+    )
+
+
+class Hole(Settings):
+    """A hole in a ring that a cable runs through."""
+
+    ring: int = Field(description="number of the ring, 0 is the base", ge=0)
+    hole_deg: Degrees
+
+
+class StraightRoute(Settings):
+    """A cable through the same hole of every ring from the base to ``to_ring``."""
+
+    name: Name
+    hole_deg: Degrees
+    to_ring: int = Field(description="ring that the cable ends at", ge=1)
+    initial_tension_n: float | None = quantity(
+        "N", "tension at zero drive, instead of the common one", None, ge=0
+    )
+    rest_length_mm: float | None = quantity("mm", "unstretched length with the lead", None, gt=0)
+
+
+class FreeRoute(Settings):
+    """A cable through listed holes, in this order, beginning at the base."""
+
+    name: Name
+    through: tuple[Hole, ...] = Field(description="holes in order from the actuator", min_length=2)
+    initial_tension_n: float | None = quantity(
+        "N", "tension at zero drive, instead of the common one", None, ge=0
+    )
+    rest_length_mm: float | None = quantity("mm", "unstretched length with the lead", None, gt=0)
+
+
+def _route_tag(value: Any) -> str:
+    through = "through" in value if isinstance(value, dict) else isinstance(value, FreeRoute)
+    return "(through)" if through else "(straight)"
+
+
+Route: TypeAlias = Annotated[
+    Annotated[StraightRoute, Tag("(straight)")] | Annotated[FreeRoute, Tag("(through)")],
+    Discriminator(_route_tag),
+]
+
+
+class CableSettings(Settings):
+    """The cables: values common to all, and their routes."""
+
+    youngs_modulus_mpa: float = quantity("MPa", "Young's modulus", gt=0)
+    diameter_mm: float = quantity("mm", "diameter", gt=0)
+    lead_mm: float = quantity("mm", "actuator to base ring, part of the cable's length", gt=0)
+    damping_n_s_m: float = quantity("N s/m", "axial damping of one cable", 0.0, ge=0)
+    initial_tension_n: float | None = quantity(
+        "N",
+        "tension at zero drive, from which rest lengths follow; or give rest_length_mm per route",
+        None,
+        ge=0,
+    )
+    routes: tuple[Route, ...] = Field(
+        description="one entry per cable, in the order of the drives", min_length=1
+    )
+
+
+class Tip(Settings):
+    """The ring that is the end effector."""
+
+    ring: int = Field(description="end pose = centroid and normal of this ring", ge=1)
+
+
+Stroke: TypeAlias = tuple[float, float]
+Vector: TypeAlias = tuple[float, float, float]

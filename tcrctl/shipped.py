@@ -1,0 +1,72 @@
+"""Experiments and robots that come with the program, by name.
+
+Robots lie in the package. Experiments lie in ``experiments/`` beside it in a checkout, and inside it in an
+installed wheel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from tcrctl.errors import InputError, UnknownNameError
+
+_PACKAGE = Path(__file__).parent
+
+
+def experiments() -> dict[str, Path]:
+    """Return the files of the shipped experiments by name, sorted."""
+    inside = _PACKAGE / "experiments"
+    return _by_name(inside if inside.is_dir() else _PACKAGE.parent / "experiments")
+
+
+def robots() -> dict[str, Path]:
+    """Return the files of the shipped robots by name, sorted."""
+    return _by_name(_PACKAGE / "robot" / "models")
+
+
+def find_experiment(name_or_path: str) -> Path:
+    """Return the file of an experiment.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+
+    Raises:
+        UnknownNameError: If there is no shipped experiment of that name.
+        InputError: If the path leads to no file.
+    """
+    return _find("experiment", name_or_path, experiments(), Path())
+
+
+def find_robot(name_or_path: str, folder: Path | None = None) -> Path:
+    """Return the file of a robot.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+        folder: Where a relative path starts; the working directory if left out.
+
+    Raises:
+        UnknownNameError: If there is no shipped robot of that name.
+        InputError: If the path leads to no file.
+    """
+    return _find("robot", name_or_path, robots(), folder or Path())
+
+
+def is_path(name_or_path: str) -> bool:
+    """Tell a path (has a separator or ends in .yaml, .yml) from a shipped name."""
+    return "/" in name_or_path or "\\" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
+
+
+def _by_name(folder: Path) -> dict[str, Path]:
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def _find(kind: str, name_or_path: str, shipped: Mapping[str, Path], folder: Path) -> Path:
+    if is_path(name_or_path):
+        path = folder / Path(name_or_path).expanduser()
+        if not path.is_file():
+            raise InputError(f"{path}: there is no such file")
+        return path
+    if name_or_path not in shipped:
+        raise UnknownNameError(kind, name_or_path, list(shipped))
+    return shipped[name_or_path]

@@ -1,0 +1,170 @@
+"""The experiment file: which robot, which trajectory, which controller, which plant.
+
+SPEC (name or path) -> strict YAML -> --set -> ExperimentSpec + RobotDescription -> LoadedSpec
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import Field, model_validator
+
+from tcrctl import shipped, strict_yaml
+from tcrctl.controller.settings import ControllerSettings
+from tcrctl.criterion import CriterionText
+from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
+from tcrctl.plant.settings import PlantSettings
+from tcrctl.robot.description import RobotDescription
+from tcrctl.robot.sections import Name
+from tcrctl.settings import Path as Keys
+from tcrctl.settings import Settings, quantity, refuse
+from tcrctl.trajectory.settings import TrajectorySettings
+
+
+class LogSettings(Settings):
+    """How often the log reaches the disk; flushed at the earlier of the two."""
+
+    flush_s: float = quantity("s", "longest time between two flushes", 0.5, gt=0)
+    flush_steps: int = Field(default=500, ge=1, description="most control steps between two flushes")
+    fsync: bool = Field(default=False, description="wait until the disk has the data, against power failure")
+
+
+class ExperimentSpec(Settings):
+    """One experiment, every default filled in."""
+
+    name: Name
+    description: str = Field(default="", description="one line for listings")
+    source: str = Field(default="", description="where the experiment comes from, for instance a figure")
+    robot: str = Field(
+        description="shipped robot, or path of a robot file relative to this one", min_length=1
+    )
+    seed: int = Field(default=0, ge=0, lt=2**63, description="seed of everything random")
+    trajectory: TrajectorySettings
+    controller: ControllerSettings
+    estimator: EstimatorSettings = PassiveObserverSettings(kind="passive_observer")
+    plant: PlantSettings
+    criteria: tuple[CriterionText, ...] = Field(
+        default=(), description="what the run must achieve, else exit code 3"
+    )
+    log: LogSettings = LogSettings()
+
+    @model_validator(mode="after")
+    def _sections_agree(self) -> ExperimentSpec:
+        refuse(_disagreements(self))
+        return self
+
+
+def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+    step, period = spec.plant.step_ms, spec.controller.period_s
+    steps = period * 1e3 / step
+    if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
+        what = f"{period:g} s must be a whole number of steps; with {step:g} ms it is {steps:g}"
+        yield ("plant", "step_ms"), f"a control period of {what}"
+
+
+def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+    """Yield path and message of what the experiment asks and the robot does not have.
+
+    Args:
+        spec: The experiment.
+        robot: Its robot.
+    """
+    count, rings = robot.modules.count, spec.plant.measured_rings
+    for i, ring in enumerate(() if rings == "all" else rings):
+        if ring > count:
+            yield (
+                ("plant", "measured_rings", i),
+                f"there is no ring {ring}; {robot.name} has rings 1 to {count}",
+            )
+    tension = spec.controller.tension
+    if tension is not None and tension.ceiling_n > robot.tension_limit_n:
+        limit = f"tension_limit_n of {robot.name}, {robot.tension_limit_n:g}"
+        yield ("controller", "tension", "ceiling_n"), f"must be at most {limit}, not {tension.ceiling_n:g}"
+    if spec.controller.modes > 12 * count:
+        yield ("controller", "modes"), f"must be at most {12 * count}, all coordinates of {robot.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedSpec:
+    """An experiment ready to run, and where it came from.
+
+    Attributes:
+        spec: The experiment.
+        robot: Its robot.
+        given_text: The file as it is on disk.
+        path: The file.
+        robot_path: File of the robot.
+        overrides: ``--set`` arguments, already applied.
+    """
+
+    spec: ExperimentSpec
+    robot: RobotDescription
+    given_text: bytes
+    path: Path
+    robot_path: Path
+    overrides: tuple[str, ...]
+
+
+def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
+    """Read an experiment and its robot.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+        overrides: Assignments ``a.b=c`` as given to ``--set``, applied in order.
+
+    Raises:
+        UnknownNameError: If there is no shipped experiment of that name.
+        SpecError: If the experiment or its robot has problems; all of both are listed.
+        InputError: If a file is missing.
+    """
+    path = shipped.find_experiment(name_or_path)
+    given = strict_yaml.read(path)
+    document = strict_yaml.loads(given, str(path))
+    document, problems = _overridden(document, overrides)
+    spec, robot, robot_path = _validated(document, path.parent, problems)
+    problems = [
+        Problem(document.where(keys), ".".join(map(str, keys)), message)
+        for keys, message in misfits(spec, robot)
+    ]
+    if problems:
+        raise SpecError(problems)
+    return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides))
+
+
+def _overridden(
+    document: strict_yaml.Document, overrides: Sequence[str]
+) -> tuple[strict_yaml.Document, list[Problem]]:
+    """Return the document with all overrides that can be applied, and why the others cannot."""
+    problems: list[Problem] = []
+    for assignment in overrides:
+        try:
+            document = strict_yaml.override(document, assignment)
+        except SpecError as error:
+            problems += error.problems
+    return document, problems
+
+
+def _validated(
+    document: strict_yaml.Document, folder: Path, problems: list[Problem]
+) -> tuple[ExperimentSpec, RobotDescription, Path]:
+    """Return experiment and robot, or raise the problems of both after those already known."""
+    robot, robot_path = None, Path()
+    try:
+        spec = strict_yaml.validate(document, ExperimentSpec)
+    except SpecError as error:
+        problems += error.problems
+    name = document.data.get("robot") if isinstance(document.data, dict) else None
+    if isinstance(name, str) and name:
+        try:
+            robot_path = shipped.find_robot(name, folder)
+            robot = strict_yaml.validate(strict_yaml.load(robot_path), RobotDescription)
+        except SpecError as error:
+            problems += error.problems
+        except InputError as error:
+            problems.append(Problem(document.where(("robot",)), "robot", str(error)))
+    if problems or robot is None:
+        raise SpecError(problems)
+    return spec, robot, robot_path
