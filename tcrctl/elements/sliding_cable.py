@@ -1,0 +1,83 @@
+"""Sliding cable through n holes, driven at one end, anchored at the other; frictionless and massless.
+
+Each hole is a point of a ring, p_h = Σ_i w_hi r_i (torus.point_weights). With the path length
+l(q) = lead + Σ_h |p_{h+1} - p_h|, the drive d (length taken in) and the rest length l0 the cable obeys
+
+    λ = T = max(0, k (l(q) + d - l0) + c (dl/dt + u)),    k = EA / l0,    u = dd/dt
+
+which is the driving constraint Φ of (6)-(8) and (20) with the massless actuation node eliminated: Φ_q' λ in
+(9) becomes T ∂l/∂q. T is the same along the path, so ∂l/∂p_h is the difference of two unit vectors and ∂²l/∂q²
+is block banded and positive semidefinite (l is convex), with (I - e e') / length per segment. An implicit rule
+gives dl/dt + u = w (l + d - before); then T is the derivative of T² / (2 (k + c w)).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from tcrctl.signals import Array
+
+#: Columns of the cable parameters (m, 4): l0 with lead [m], EA / l0 [N/m], damping [N s/m], lead [m].
+REST, STIFFNESS, DAMPING, LEAD = range(4)
+
+
+@njit(cache=True, error_model="numpy")
+def hole(q: Array, nodes: np.ndarray, weights: Array, h: int) -> tuple[float, float, float]:
+    """Position of hole ``h`` [m]; nodes (n_holes, 3) and weights (n_holes, 3)."""
+    a, b, c = 3 * nodes[h, 0], 3 * nodes[h, 1], 3 * nodes[h, 2]
+    wa, wb, wc = weights[h, 0], weights[h, 1], weights[h, 2]
+    return (
+        wa * q[a] + wb * q[b] + wc * q[c],
+        wa * q[a + 1] + wb * q[b + 1] + wc * q[c + 1],
+        wa * q[a + 2] + wb * q[b + 2] + wc * q[c + 2],
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def segment(q: Array, nodes: np.ndarray, weights: Array, h: int) -> tuple[float, float, float, float]:
+    """Length [m] and direction of the segment from hole ``h`` to hole ``h + 1``."""
+    x0, y0, z0 = hole(q, nodes, weights, h)
+    x1, y1, z1 = hole(q, nodes, weights, h + 1)
+    dx, dy, dz = x1 - x0, y1 - y0, z1 - z0
+    length = np.sqrt(dx * dx + dy * dy + dz * dz)
+    return length, dx / length, dy / length, dz / length
+
+
+@njit(cache=True, error_model="numpy")
+def _spread(
+    G: Array, c: int, nodes: np.ndarray, weights: Array, h: int, x: float, y: float, z: float
+) -> None:
+    """Add the derivative (x, y, z) with respect to hole ``h`` to row ``c`` of G (m, 3 n_nodes)."""
+    for i in range(3):
+        weight = weights[h, i]
+        if weight != 0.0:
+            node = 3 * nodes[h, i]
+            G[c, node] += weight * x
+            G[c, node + 1] += weight * y
+            G[c, node + 2] += weight * z
+
+
+@njit(cache=True, error_model="numpy")
+def path_gradients(
+    q: Array, first_hole: np.ndarray, nodes: np.ndarray, weights: Array, cables: Array, length: Array, G: Array
+) -> None:
+    """Fill path lengths (m,) [m] and G = ∂l/∂q (m, 3 n_nodes).
+
+    Holes of cable c are first_hole[c] .. first_hole[c + 1] - 1; ``cables`` (m, 4) as in the column names.
+    """
+    G[:] = 0.0
+    for c in range(cables.shape[0]):
+        length[c] = cables[c, LEAD]
+        for h in range(first_hole[c], first_hole[c + 1] - 1):
+            l, ex, ey, ez = segment(q, nodes, weights, h)
+            length[c] += l
+            _spread(G, c, nodes, weights, h, -ex, -ey, -ez)
+            _spread(G, c, nodes, weights, h + 1, ex, ey, ez)
+
+
+@njit(cache=True, error_model="numpy")
+def tension(total: float, w: float, before: float, cables: Array, c: int) -> float:
+    """λ = T [N] >= 0 of cable ``c`` at ``total`` = l + d [m] with dl/dt + u = w (total - before)."""
+    T = cables[c, STIFFNESS] * (total - cables[c, REST]) + cables[c, DAMPING] * w * (total - before)
+    return max(T, 0.0)

@@ -1,0 +1,161 @@
+"""Cholesky factorisation and solves for symmetric block-banded matrices.
+
+A robot of n modules gives an n x n block matrix with dense blocks on the diagonal and on w upper block
+diagonals (w = 1, block tridiagonal, unless a spring or cable skips modules). Storage: ``A[j, d]`` is block
+(j, j + d) of the upper triangle, shape (n, w + 1, b, b); only the upper triangle of ``A[j, 0]`` is read.
+All inner loops run along rows, so that the compiler vectorises them. Source: [GVL13] Sec. 4.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from tcrctl.signals import Array
+
+
+@njit(cache=True, error_model="numpy")
+def factor_diagonal(block: Array) -> bool:
+    """Overwrite the upper triangle of ``block`` (b, b) by U with block = U'U; False if it is not positive."""
+    b = block.shape[0]
+    for k in range(b):
+        pivot = block[k, k]
+        if not pivot > 0.0:  # also catches NaN
+            return False
+        scale = 1.0 / np.sqrt(pivot)
+        for c in range(k, b):
+            block[k, c] *= scale
+        for r in range(k + 1, b):
+            factor = block[k, r]
+            if factor != 0.0:
+                for c in range(r, b):
+                    block[r, c] -= factor * block[k, c]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def solve_transposed(U: Array, X: Array) -> None:
+    """Overwrite ``X`` (b, r) by U'^-1 X with U upper triangular (b, b)."""
+    b, r = X.shape
+    for k in range(b):
+        inverse = 1.0 / U[k, k]
+        for c in range(r):
+            X[k, c] *= inverse
+        for i in range(k + 1, b):
+            factor = U[k, i]
+            if factor != 0.0:
+                for c in range(r):
+                    X[i, c] -= factor * X[k, c]
+
+
+@njit(cache=True, error_model="numpy")
+def solve_upper(U: Array, X: Array) -> None:
+    """Overwrite ``X`` (b, r) by U^-1 X with U upper triangular (b, b)."""
+    b, r = X.shape
+    for k in range(b - 1, -1, -1):
+        for i in range(k + 1, b):
+            factor = U[k, i]
+            if factor != 0.0:
+                for c in range(r):
+                    X[k, c] -= factor * X[i, c]
+        inverse = 1.0 / U[k, k]
+        for c in range(r):
+            X[k, c] *= inverse
+
+
+@njit(cache=True, error_model="numpy")
+def _subtract_transposed_product(target: Array, left: Array, right: Array) -> None:
+    """target -= left' right, all row-major."""
+    rows, cols = target.shape
+    for k in range(left.shape[0]):
+        for r in range(rows):
+            factor = left[k, r]
+            if factor != 0.0:
+                for c in range(cols):
+                    target[r, c] -= factor * right[k, c]
+
+
+@njit(cache=True, error_model="numpy")
+def _subtract_product(target: Array, left: Array, right: Array) -> None:
+    """target -= left right, all row-major."""
+    rows, cols = target.shape
+    for r in range(rows):
+        for k in range(right.shape[0]):
+            factor = left[r, k]
+            if factor != 0.0:
+                for c in range(cols):
+                    target[r, c] -= factor * right[k, c]
+
+
+@njit(cache=True, error_model="numpy")
+def factor(A: Array) -> bool:
+    """Overwrite ``A`` (n, w + 1, b, b) by its upper Cholesky factor.
+
+    Args:
+        A: Block-banded symmetric matrix in the storage of this module.
+
+    Returns:
+        False if the matrix is not positive definite; ``A`` is then of no use.
+    """
+    n, bands = A.shape[0], A.shape[1]
+    for j in range(n):
+        if not factor_diagonal(A[j, 0]):
+            return False
+        last = min(bands, n - j)
+        for d in range(1, last):
+            solve_transposed(A[j, 0], A[j, d])
+        for d in range(1, last):
+            for e in range(d, last):
+                _subtract_transposed_product(A[j + d, e - d], A[j, d], A[j, e])
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def solve(U: Array, X: Array) -> None:
+    """Overwrite the right-hand sides by the solution of U'U x = rhs.
+
+    Args:
+        U: Factor made by :func:`factor` (n, w + 1, b, b).
+        X: Right-hand sides, one per column (n b, r).
+    """
+    n, bands, b = U.shape[0], U.shape[1], U.shape[2]
+    for j in range(n):
+        here = X[j * b : (j + 1) * b]
+        solve_transposed(U[j, 0], here)
+        for d in range(1, min(bands, n - j)):
+            _subtract_transposed_product(X[(j + d) * b : (j + d + 1) * b], U[j, d], here)
+    for j in range(n - 1, -1, -1):
+        here = X[j * b : (j + 1) * b]
+        for d in range(1, min(bands, n - j)):
+            _subtract_product(here, U[j, d], X[(j + d) * b : (j + d + 1) * b])
+        solve_upper(U[j, 0], here)
+
+
+@njit(cache=True, error_model="numpy")
+def multiply(A: Array, x: Array) -> Array:
+    """Product of an unfactored block-banded matrix (n, w + 1, b, b) with a vector (n b,)."""
+    n, bands, b = A.shape[0], A.shape[1], A.shape[2]
+    y = np.zeros(n * b)
+    for j in range(n):
+        for d in range(min(bands, n - j)):
+            for r in range(b):
+                first = r if d == 0 else 0
+                for c in range(first, b):
+                    value = A[j, d, r, c]
+                    y[j * b + r] += value * x[(j + d) * b + c]
+                    if d > 0 or c > r:
+                        y[(j + d) * b + c] += value * x[j * b + r]
+    return y
+
+
+@njit(cache=True, error_model="numpy")
+def to_dense(A: Array) -> Array:
+    """Dense symmetric matrix (n b, n b) of a block-banded one; for tests and small offline work."""
+    size = A.shape[0] * A.shape[2]
+    dense = np.empty((size, size))
+    unit = np.zeros(size)
+    for i in range(size):
+        unit[i] = 1.0
+        dense[:, i] = multiply(A, unit)
+        unit[i] = 0.0
+    return dense

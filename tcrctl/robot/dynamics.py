@@ -1,0 +1,160 @@
+"""One generalized-alpha step of the robot's DAE (9), with sub-steps where Newton needs them.
+
+(16) is solved for q_{k+1} by minimising the incremental potential; λ follows from the eliminated constraint (17).
+Velocities and accelerations are affine in q_{k+1} by (12)-(14). Elongation rates in the dampers use the trapezoidal
+rule, which keeps the second order and the symmetric tangent.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from tcrctl.elements import bar, sliding_cable
+from tcrctl.numerics.generalized_alpha import coefficients
+from tcrctl.robot.equations import FORCE, Q_FREE, Load, Workspace
+from tcrctl.robot.model import Model
+from tcrctl.robot.potential import Outcome, minimise
+from tcrctl.signals import Array
+
+#: Largest nodal force left by a step [N]; the weight of one module is 0.1 N.
+TOLERANCE = 1e-6
+MAX_ITERATIONS = 12
+#: A step is cut in half at most this often.
+MAX_HALVINGS = 8
+
+
+class State(NamedTuple):
+    """Dynamic state, changed in place; arrays over all nodes (3 n_nodes,), rows of the base stay constant.
+
+    Attributes:
+        q: Positions [m].
+        v: Velocities [m/s].
+        acceleration: q̈ [m/s2].
+        auxiliary: The acceleration-like variable a of (14) [m/s2].
+        drive: Drive lengths (m,) [m].
+    """
+
+    q: Array
+    v: Array
+    acceleration: Array
+    auxiliary: Array
+    drive: Array
+
+
+class Scratch(NamedTuple):
+    """Arrays of one step: predictors and the load of (*)."""
+
+    q: Array
+    q0: Array
+    v0: Array
+    drive: Array
+    nodal: Array
+    bar_before: Array
+    bar_rate: Array
+    cable_before: Array
+
+
+def rest_state(q: Array, drive: Array) -> State:
+    """State at rest in configuration ``q`` with ``drive``; copies both."""
+    return State(q.copy(), np.zeros_like(q), np.zeros_like(q), np.zeros_like(q), drive.copy())
+
+
+def make_scratch(model: Model) -> Scratch:
+    """Allocate the arrays for ``model``."""
+    size, bars, m = 12 * (model.mass.shape[0] + 1), model.bars.shape[0], model.cables.shape[0]
+    return Scratch(
+        np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(m), np.zeros((4, size)),
+        np.zeros(bars), np.zeros(bars), np.zeros(m),
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def lengths_before(
+    model: Model, q: Array, v: Array, drive: Array, speed: Array, lag: float, s: Scratch, ws: Workspace
+) -> None:
+    """Fill s.bar_before and s.cable_before with l + lag dl/dt at (q, v) and (d, u)."""
+    bar.lengths_and_rates(q, v, model.bar_nodes, s.bar_before, s.bar_rate)
+    for b in range(s.bar_before.shape[0]):
+        s.bar_before[b] += lag * s.bar_rate[b]
+    sliding_cable.path_gradients(
+        q, model.first_hole, model.hole_nodes, model.hole_weights, model.cables, ws.length, ws.G
+    )
+    for c in range(drive.shape[0]):
+        rate = speed[c]
+        if lag != 0.0:
+            for k in range(v.shape[0]):
+                rate += ws.G[c, k] * v[k]
+        s.cable_before[c] = ws.length[c] + drive[c] + lag * rate
+
+
+@njit(cache=True, error_model="numpy")
+def try_step(
+    model: Model, x: State, speed: Array, h: float, rho: float, external: Array, ws: Workspace, s: Scratch
+) -> Outcome:
+    """One generalized-alpha step of size ``h`` [s]; changes ``x`` only if it converges."""
+    c = coefficients(rho, h)
+    lengths_before(model, x.q, x.v, x.drive, speed, 0.5 * h, s, ws)
+    inertia = c.acceleration + model.damping * c.velocity
+    for k in range(x.q.shape[0]):
+        aux = (x.acceleration[k] - c.alpha_m * x.auxiliary[k]) / (1.0 - c.alpha_m)
+        s.q0[k] = x.q[k] + h * x.v[k] + h * h * ((0.5 - c.beta) * x.auxiliary[k] + c.beta * aux)
+        s.v0[k] = x.v[k] + h * ((1.0 - c.gamma) * x.auxiliary[k] + c.gamma * aux)
+        s.q[k] = s.q0[k]
+        s.nodal[Q_FREE, k] = s.q0[k] - (x.acceleration[k] + model.damping * s.v0[k]) / inertia
+        s.nodal[FORCE, k] = external[k]
+    for i in range(speed.shape[0]):
+        s.drive[i] = x.drive[i] + h * speed[i]
+    load = Load(inertia, 2.0 / h, s.nodal, s.bar_before, s.cable_before)
+    outcome = minimise(model, s.q, s.drive, load, ws, TOLERANCE, np.int64(MAX_ITERATIONS), np.bool_(False))
+    if outcome.converged:
+        for k in range(x.q.shape[0]):
+            moved = s.q[k] - s.q0[k]
+            aux = (x.acceleration[k] - c.alpha_m * x.auxiliary[k]) / (1.0 - c.alpha_m)
+            aux += (1.0 - c.alpha_f) / (1.0 - c.alpha_m) * c.acceleration * moved
+            x.auxiliary[k] = aux
+            x.acceleration[k] += c.acceleration * moved
+            x.v[k] = s.v0[k] + c.velocity * moved
+            x.q[k] = s.q[k]
+        x.drive[:] = s.drive
+    return outcome
+
+
+@njit(cache=True, error_model="numpy")
+def advance(
+    model: Model, x: State, speed: Array, duration: float, step: float, rho: float, external: Array,
+    ws: Workspace, s: Scratch,
+) -> tuple[bool, float, float, int]:
+    """Advance the state in place by ``duration`` with constant drive speeds.
+
+    Args:
+        model: Robot arrays.
+        x: State; on failure it holds the last step that converged.
+        speed: Drive speeds u (m,) [m/s].
+        duration: Time to advance [s].
+        step: Largest internal step [s].
+        rho: Spectral radius of (15).
+        external: External force, gravity included (3 n_nodes,) [N].
+        ws: Workspace; its tensions belong to the state at the end.
+        s: Scratch arrays.
+
+    Returns:
+        (converged, residual [N], smallest step used [s], Newton iterations).
+    """  # fmt: skip
+    done, residual, smallest, halvings, iterations = 0.0, 0.0, step, 0, 0
+    while done < duration * (1.0 - 1e-9):
+        h = min(step / 2.0**halvings, duration - done)
+        outcome = try_step(model, x, speed, h, rho, external, ws, s)
+        iterations += outcome.iterations
+        residual = outcome.residual
+        if outcome.converged:
+            done += h
+            halvings = max(0, halvings - 1)
+        else:
+            halvings += 1
+            if halvings > MAX_HALVINGS:
+                return False, residual, smallest, iterations
+            smallest = min(smallest, step / 2.0**halvings)
+    return True, residual, smallest, iterations

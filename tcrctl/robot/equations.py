@@ -1,0 +1,236 @@
+"""Assembly: internal forces, tangent and potential of the whole robot from its elements.
+
+The equation of motion (9), actuation node eliminated, is  M q̈ + Σ_c λ_c ∂l_c/∂q + f_in(q, q̇) - f_ext = 0.
+Every implicit rule turns it into equations for the positions q alone,
+
+    r(q) = c M (q - q̃) + f_elements(q) + S (q - q_s) - f_ext = 0                                  (*)
+
+c and q̃ come from the integration rule (c = 0 in statics), S are virtual springs that an estimator ties to
+measured nodes. Element damping needs dl/dt, which every rule gives as w (l - l_before): w = 0 in statics,
+1/h with l_before = l_k (backward Euler), 2/h with l_before = l_k + h/2 dl_k/dt (trapezoid, used with
+generalized-alpha). So r is always the gradient of one scalar, the incremental potential, and its tangent
+is symmetric: K + Σ_c k_c g_c g_c', K block banded, one rank-1 term per taut cable.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from tcrctl.elements import bar, sliding_cable
+from tcrctl.robot.model import FIXED, Model
+from tcrctl.signals import Array
+
+#: Rows of ``Load.nodal``.
+Q_FREE, FORCE, SPRING, SPRING_AT = range(4)
+
+
+class Load(NamedTuple):
+    """What (*) holds beside the elements, for one solve.
+
+    Attributes:
+        inertia: c of (*) [1/s2].
+        w: d(dl/dt)/dl of the rule [1/s].
+        nodal: Rows q̃ [m], f_ext with gravity [N], diagonal of S [N/m], q_s [m] (4, 3 n_nodes).
+        bar_before: l_before of the bars (n_bars,) [m].
+        cable_before: (l + d)_before of the cables (m,) [m].
+    """
+
+    inertia: float
+    w: float
+    nodal: Array
+    bar_before: Array
+    cable_before: Array
+
+
+class Workspace(NamedTuple):
+    """Arrays that assembly and solves fill; allocated once by :func:`make_workspace`.
+
+    Attributes:
+        K: Block-banded part of the tangent (n_modules, w + 1, 12, 12) [N/m].
+        U: Its Cholesky factor, same shape.
+        r: Residual of (*) for the free coordinates (12 n_modules,) [N].
+        G: ∂l/∂q (m, 3 n_nodes).
+        tension: λ (m,) [N].
+        axial: k_c = ∂λ/∂(l + d) of taut cables, 0 of slack ones (m,) [N/m].
+        length: Path lengths l (m,) [m].
+        columns: Right-hand sides of solves (12 n_modules, m + 1).
+        small: Matrix of the cable coupling (m, m).
+    """
+
+    K: Array
+    U: Array
+    r: Array
+    G: Array
+    tension: Array
+    axial: Array
+    length: Array
+    columns: Array
+    small: Array
+
+
+def make_workspace(model: Model) -> Workspace:
+    """Allocate the arrays for ``model``."""
+    n, m = model.mass.shape[0], model.cables.shape[0]
+    shape = (n, model.bandwidth + 1, 12, 12)
+    return Workspace(
+        K=np.zeros(shape),
+        U=np.zeros(shape),
+        r=np.zeros(12 * n),
+        G=np.zeros((m, 12 * (n + 1))),
+        tension=np.zeros(m),
+        axial=np.zeros(m),
+        length=np.zeros(m),
+        columns=np.zeros((12 * n, m + 1)),
+        small=np.zeros((m, m)),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _add_pair(K: Array, i: int, j: int, f: float, s: Array) -> None:
+    """Add f * s, s = (xx, xy, xz, yy, yz, zz), at node pair (i, j) of the upper triangle of K."""
+    if i < FIXED or j < FIXED:
+        return
+    if i > j:
+        i, j = j, i
+    row, band = i // 4 - 1, j // 4 - i // 4
+    a, b = 3 * (i % 4), 3 * (j % 4)
+    K[row, band, a, b] += f * s[0]
+    K[row, band, a, b + 1] += f * s[1]
+    K[row, band, a, b + 2] += f * s[2]
+    K[row, band, a + 1, b] += f * s[1]
+    K[row, band, a + 1, b + 1] += f * s[3]
+    K[row, band, a + 1, b + 2] += f * s[4]
+    K[row, band, a + 2, b] += f * s[2]
+    K[row, band, a + 2, b + 1] += f * s[4]
+    K[row, band, a + 2, b + 2] += f * s[5]
+
+
+@njit(cache=True, error_model="numpy")
+def _fill_line(s: Array, axial: float, lateral: float, ex: float, ey: float, ez: float) -> None:
+    """s = axial e e' + lateral (I - e e') as (xx, xy, xz, yy, yz, zz)."""
+    d = axial - lateral
+    s[0] = d * ex * ex + lateral
+    s[1] = d * ex * ey
+    s[2] = d * ex * ez
+    s[3] = d * ey * ey + lateral
+    s[4] = d * ey * ez
+    s[5] = d * ez * ez + lateral
+
+
+@njit(cache=True, error_model="numpy")
+def _add_force(r: Array, node: int, x: float, y: float, z: float) -> None:
+    """Add a force to the residual of a free node."""
+    if node >= FIXED:
+        first = 3 * (node - FIXED)
+        r[first] += x
+        r[first + 1] += y
+        r[first + 2] += z
+
+
+@njit(cache=True, error_model="numpy")
+def _add_bars(
+    q: Array, nodes: np.ndarray, bars: Array, w: float, before: Array, r: Array, K: Array, tangent: bool
+) -> float:
+    """Add all bars to r (and K); return their potential [J]."""
+    s = np.empty(6)
+    energy = 0.0
+    for b in range(bars.shape[0]):
+        i, j = nodes[b, 0], nodes[b, 1]
+        length, ex, ey, ez = bar.direction(q, i, j)
+        T = bar.tension(length, w, before[b], bars, b)
+        if T == 0.0 and bars[b, bar.TENSION_ONLY] != 0.0:
+            continue
+        axial = bars[b, bar.STIFFNESS] + bars[b, bar.DAMPING] * w
+        energy += 0.5 * T * T / axial
+        _add_force(r, j, T * ex, T * ey, T * ez)
+        _add_force(r, i, -T * ex, -T * ey, -T * ez)
+        if tangent:
+            _fill_line(s, axial, T / length, ex, ey, ez)
+            _add_pair(K, i, i, 1.0, s)
+            _add_pair(K, j, j, 1.0, s)
+            _add_pair(K, i, j, -1.0, s)
+    return energy
+
+
+@njit(cache=True, error_model="numpy")
+def _add_segment(K: Array, nodes: np.ndarray, weights: Array, h: int, s: Array) -> None:
+    """Add the line matrix ``s`` between holes h and h + 1, spread on the six ring nodes that carry them."""
+    for a in range(6):
+        weight_a = weights[h + a // 3, a % 3] * (1.0 if a >= 3 else -1.0)
+        if weight_a != 0.0:
+            for b in range(a, 6):
+                weight_b = weights[h + b // 3, b % 3] * (1.0 if b >= 3 else -1.0)
+                if weight_b != 0.0:
+                    _add_pair(K, nodes[h + a // 3, a % 3], nodes[h + b // 3, b % 3], weight_a * weight_b, s)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_cables(model: Model, q: Array, drive: Array, load: Load, ws: Workspace, tangent: bool) -> float:
+    """Add all cables to r (and K), fill G, tension, axial, length; return their potential [J]."""
+    cables, nodes, weights = model.cables, model.hole_nodes, model.hole_weights
+    sliding_cable.path_gradients(q, model.first_hole, nodes, weights, cables, ws.length, ws.G)
+    s = np.empty(6)
+    energy = 0.0
+    for c in range(cables.shape[0]):
+        T = sliding_cable.tension(ws.length[c] + drive[c], load.w, load.cable_before[c], cables, c)
+        axial = cables[c, sliding_cable.STIFFNESS] + cables[c, sliding_cable.DAMPING] * load.w
+        ws.tension[c] = T
+        ws.axial[c] = axial if T > 0.0 else 0.0
+        energy += 0.5 * T * T / axial
+        for k in range(ws.r.shape[0]):
+            ws.r[k] += T * ws.G[c, 3 * FIXED + k]
+        if tangent and T > 0.0:
+            for h in range(model.first_hole[c], model.first_hole[c + 1] - 1):
+                length, ex, ey, ez = sliding_cable.segment(q, nodes, weights, h)
+                _fill_line(s, 0.0, T / length, ex, ey, ez)
+                _add_segment(ws.K, nodes, weights, h, s)
+    return energy
+
+
+@njit(cache=True, error_model="numpy")
+def _start(q: Array, mass: Array, inertia: float, nodal: Array, r: Array, K: Array, tangent: bool) -> float:
+    """Start r and K with inertia, virtual springs and external forces of (*); return their potential [J]."""
+    energy = 0.0
+    if tangent:
+        K[:] = 0.0
+    for k in range(r.shape[0]):
+        i, a = k // 12, k % 12
+        first = 12 * (i + 1)
+        force = 0.0
+        if inertia != 0.0:
+            for b in range(12):
+                force += mass[i, a, b] * (q[first + b] - nodal[Q_FREE, first + b])
+                if tangent:
+                    K[i, 0, a, b] += inertia * mass[i, a, b]
+            force *= inertia
+            energy += 0.5 * force * (q[first + a] - nodal[Q_FREE, first + a])
+        g = first + a
+        spring = nodal[SPRING, g] * (q[g] - nodal[SPRING_AT, g])
+        energy += 0.5 * spring * (q[g] - nodal[SPRING_AT, g]) - nodal[FORCE, g] * q[g]
+        r[k] = force + spring - nodal[FORCE, g]
+        if tangent:
+            K[i, 0, a, a] += nodal[SPRING, g]
+    return energy
+
+
+@njit(cache=True, error_model="numpy")
+def assemble(model: Model, q: Array, drive: Array, load: Load, ws: Workspace, tangent: bool) -> float:
+    """Fill ``ws`` with residual, cable gradients, tensions and (if ``tangent``) K at ``q``.
+
+    Args:
+        model: Robot arrays.
+        q: Node positions (3 n_nodes,) [m].
+        drive: Drive lengths d (m,) [m].
+        load: Integration rule, virtual springs and external forces.
+        ws: Output arrays.
+        tangent: Whether K is wanted.
+
+    Returns:
+        The incremental potential [J] whose gradient is r.
+    """
+    energy = _start(q, model.mass, load.inertia, load.nodal, ws.r, ws.K, tangent)
+    energy += _add_bars(q, model.bar_nodes, model.bars, load.w, load.bar_before, ws.r, ws.K, tangent)
+    return energy + _add_cables(model, q, drive, load, ws, tangent)

@@ -1,0 +1,185 @@
+"""The robot as frozen arrays: what every kernel reads and nothing changes.
+
+``build_model`` turns a validated description (YAML) into a :class:`Model`; ``scaled`` makes the mismatched
+twin that a simulated plant uses.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcrctl.elements import bar, sliding_cable, torus
+from tcrctl.robot.description import RobotDescription, cable_routes, spring_list
+from tcrctl.signals import Array
+
+#: Nodes of one module, and of the fixed base: three on the ring and the apex.
+FIXED = 4
+APEX = 3
+#: Rods and ring sides per module; they come first among the bars.
+RIGID_BARS = 6
+
+
+class Model(NamedTuple):
+    """What the kernels read: the arrays of one robot, read-only. Node numbering: tcrctl/__init__.py.
+
+    Attributes:
+        mass: Mass matrix: rings (4), rods, springs; one block per free module (n_modules, 12, 12) [kg].
+        damping: Mass-proportional damping [1/s].
+        bandwidth: Upper block bandwidth w of the tangent.
+        bar_nodes: End nodes of rods, ring sides and springs (n_bars, 2).
+        bars: Their parameters (n_bars, 4), columns as in elements.bar.
+        first_hole: Holes of cable c are first_hole[c] .. first_hole[c + 1] - 1 (m + 1,).
+        hole_nodes: Ring nodes that carry hole h (n_holes, 3).
+        hole_weights: Their weights (n_holes, 3), see elements.torus.
+        cables: Cable parameters (m, 4), columns as in elements.sliding_cable.
+    """
+
+    mass: Array
+    damping: float
+    bandwidth: int
+    bar_nodes: NDArray[np.int64]
+    bars: Array
+    first_hole: NDArray[np.int64]
+    hole_nodes: NDArray[np.int64]
+    hole_weights: Array
+    cables: Array
+
+
+def node_index(name: str) -> int:
+    """Row of a node named ``base.n1`` .. ``m7.apex``."""
+    module, _, node = name.partition(".")
+    number = 0 if module == "base" else int(module[1:])
+    return FIXED * number + {"n1": 0, "n2": 1, "n3": 2, "apex": APEX}[node]
+
+
+def _stack(d: RobotDescription) -> Array:
+    """Node positions of the straight, undeformed stack (n_nodes, 3) [m]."""
+    radius, pitch = d.modules.ring_diameter_mm / 2000.0, d.modules.pitch_mm / 1000.0
+    nodes = np.zeros((FIXED * (d.modules.count + 1), 3))
+    for module in range(d.modules.count + 1):
+        for k in range(3):
+            angle = k * torus.TURN_THIRD
+            nodes[FIXED * module + k] = [radius * math.cos(angle), radius * math.sin(angle), -module * pitch]
+        nodes[FIXED * module + APEX] = [0.0, 0.0, -module * pitch - d.modules.cone_height_mm / 1000.0]
+    return nodes
+
+
+def _module_bars(module: int) -> list[tuple[int, int]]:
+    """Three rods and three ring sides of one module as pairs of node rows."""
+    ring = (FIXED * module, FIXED * module + 1, FIXED * module + 2)
+    return [(node, FIXED * module + APEX) for node in ring] + torus.sides(ring)
+
+
+def _mass_matrix(d: RobotDescription) -> Array:
+    """(n_modules, 12, 12): ring by (4), rods consistent, springs lumped on their end nodes [kg]."""
+    n = d.modules.count
+    cell = d.modules.mass_g / 1000.0
+    block = np.zeros((4, 4))
+    for k in range(3):
+        block[k, k] += torus.node_mass(cell * d.modules.ring_mass_fraction)
+        rod = cell * (1.0 - d.modules.ring_mass_fraction) / 3.0
+        for i, j in ((k, k), (APEX, APEX)):
+            block[i, j] += rod / 3.0
+        block[k, APEX] += rod / 6.0
+        block[APEX, k] += rod / 6.0
+    blocks = np.repeat(block[None], n + 1, axis=0)
+    for spring in spring_list(d):
+        for node in (node_index(name) for name in spring.nodes):
+            blocks[node // FIXED, node % FIXED, node % FIXED] += spring.mass / 2.0
+    return np.stack([np.kron(b, np.eye(3)) for b in blocks[1:]])
+
+
+def _bars(d: RobotDescription, nodes: Array) -> tuple[NDArray[np.int64], Array]:
+    """End nodes and parameters of rods and ring sides of the free modules (RIGID_BARS each), then springs."""
+    section = math.pi / 4.0 * (d.modules.rod_diameter_mm / 1000.0) ** 2
+    ea = d.modules.youngs_modulus_mpa * 1e6 * section
+    pairs = [pair for module in range(1, d.modules.count + 1) for pair in _module_bars(module)]
+    lengths = [float(np.linalg.norm(nodes[j] - nodes[i])) for i, j in pairs]
+    rows = [[length, ea / length, d.modules.damping_n_s_m, 0.0] for length in lengths]
+    for spring in spring_list(d):
+        pairs.append((node_index(spring.nodes[0]), node_index(spring.nodes[1])))
+        stiffness = spring.axial_stiffness / spring.natural_length
+        rows.append([spring.natural_length, stiffness, spring.damping, float(spring.tension_only)])
+    return np.array(pairs, dtype=np.int64), np.array(rows)
+
+
+def _holes(d: RobotDescription) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """first_hole, hole_nodes, hole_weights of all routes."""
+    nodes, weights, first = [], [], [0]
+    for route in cable_routes(d):
+        for ring, angle in route.holes:
+            nodes.append([FIXED * ring + k for k in range(3)])
+            weights.append(torus.point_weights(angle))
+        first.append(len(nodes))
+    return np.array(first, dtype=np.int64), np.array(nodes, dtype=np.int64), np.array(weights)
+
+
+def _bandwidth(bars: NDArray[np.int64], hole_nodes: NDArray[np.int64], first: NDArray[np.int64]) -> int:
+    """Largest distance in modules between two coupled free modules; at least 1."""
+    widths = [1]
+    for i, j in bars // FIXED:
+        if i > 0 and j > 0:
+            widths.append(abs(int(i) - int(j)))
+    rings = hole_nodes[:, 0] // FIXED
+    for c in range(first.shape[0] - 1):
+        path = rings[first[c] : first[c + 1]]
+        widths += [abs(int(b) - int(a)) for a, b in zip(path[:-1], path[1:], strict=True) if a > 0 and b > 0]
+    return max(widths)
+
+
+def freeze(model: Model) -> Model:
+    """Copy of ``model`` with every array read-only, so that all kernels see one type."""
+    frozen = []
+    for value in model:
+        if isinstance(value, np.ndarray):
+            value = value.copy()
+            value.flags.writeable = False
+        frozen.append(value)
+    return Model(*frozen)
+
+
+def undeformed(d: RobotDescription) -> Array:
+    """Node positions of the straight stack (3 n_nodes,) [m], where no rod is stretched."""
+    return _stack(d).ravel()
+
+
+def gravity_force(model: Model, gravity: Array) -> Array:
+    """Weight of every node coordinate (3 n_nodes,) [N] for gravity (3,) [m/s2]; zero on the base."""
+    force = np.zeros(12 * (model.mass.shape[0] + 1))
+    for i, block in enumerate(model.mass):
+        force[12 * (i + 1) : 12 * (i + 2)] = block @ np.tile(gravity, 4)
+    return force
+
+
+def build_model(d: RobotDescription, cable_rest: Array) -> Model:
+    """Kernel arrays of the robot described by ``d`` with cable rest lengths (m,) [m], lead included."""
+    first_hole, hole_nodes, hole_weights = _holes(d)
+    bar_nodes, bars = _bars(d, _stack(d))
+    routes = cable_routes(d)
+    ea = np.array([route.axial_stiffness for route in routes])
+    damping, lead = np.array([route.damping for route in routes]), np.array([route.lead for route in routes])
+    return freeze(
+        Model(
+            mass=_mass_matrix(d),
+            damping=float(d.damping_1_s),
+            bandwidth=_bandwidth(bar_nodes, hole_nodes, first_hole),
+            bar_nodes=bar_nodes,
+            bars=bars,
+            first_hole=first_hole,
+            hole_nodes=hole_nodes,
+            hole_weights=hole_weights,
+            cables=np.column_stack([cable_rest, ea / cable_rest, damping, lead]),
+        )
+    )
+
+
+def scaled(model: Model, springs: float = 1.0, cables: float = 1.0, density: float = 1.0) -> Model:
+    """Twin of ``model`` with factors on spring and cable moduli and on all masses; rest lengths unchanged."""
+    bars, strings = model.bars.copy(), model.cables.copy()
+    bars[RIGID_BARS * model.mass.shape[0] :, bar.STIFFNESS] *= springs
+    strings[:, sliding_cable.STIFFNESS] *= cables
+    return freeze(model._replace(bars=bars, cables=strings, mass=density * model.mass))

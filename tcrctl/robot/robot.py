@@ -1,0 +1,119 @@
+"""The robot at rest: kernel arrays, strung cables, rest pose and limits, built once from a description."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tcrctl.elements import sliding_cable
+from tcrctl.robot import pose
+from tcrctl.robot.description import RobotDescription, cable_routes
+from tcrctl.robot.equilibrium import (
+    Equilibrium,
+    equilibrium,
+    equilibrium_with_tensions,
+    with_rest_lengths,
+)
+from tcrctl.robot.model import FIXED, Model, build_model, gravity_force, scaled, undeformed
+from tcrctl.signals import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot with strung cables.
+
+    Attributes:
+        name: Name of the robot file.
+        cable_names: Names of the cables in the order of the drives.
+        model: Kernel arrays.
+        weight: Gravity force (3 n_nodes,) [N].
+        rest: Equilibrium at zero drive.
+        tip: Row of the first node of the tip ring.
+        stroke: Limits of the drive lengths (2,) [m].
+        tension_limit: Largest tension allowed [N].
+    """
+
+    name: str
+    cable_names: tuple[str, ...]
+    model: Model
+    weight: Array
+    rest: Equilibrium
+    tip: int
+    stroke: tuple[float, float]
+    tension_limit: float
+
+    @property
+    def n_modules(self) -> int:
+        """Number of free modules."""
+        return int(self.model.mass.shape[0])
+
+    @property
+    def n_cables(self) -> int:
+        """Number of cables m."""
+        return int(self.model.cables.shape[0])
+
+    @property
+    def rest_position(self) -> Array:
+        """End position at rest (3,) [m]."""
+        return pose.position(self.rest.q, self.tip)
+
+    @property
+    def rest_normal(self) -> Array:
+        """End normal at rest (3,)."""
+        return pose.normal(self.rest.q, self.tip)
+
+
+def _strung(d: RobotDescription, start: Array) -> tuple[Model, Array, Equilibrium]:
+    """Find the rest lengths: given ones, or those that give every cable its tension at zero drive."""
+    routes = cable_routes(d)
+    no_tension = build_model(d, np.ones(len(routes)))
+    length, gradient = np.zeros(len(routes)), np.zeros((len(routes), start.shape[0]))
+    sliding_cable.path_gradients(
+        start, no_tension.first_hole, no_tension.hole_nodes, no_tension.hole_weights, no_tension.cables,
+        length, gradient,
+    )  # fmt: skip
+    model = build_model(d, length)
+    weight = gravity_force(model, np.array(d.gravity_m_s2, dtype=float))
+    given = np.array([np.nan if r.rest_length is None else r.rest_length for r in routes])
+    wanted = np.array([0.0 if r.initial_tension is None else r.initial_tension for r in routes])
+    by_tension = np.isnan(given)
+    if by_tension.any():
+        trial = equilibrium_with_tensions(model, np.where(by_tension, wanted, 0.0), weight, start)
+        ea = model.cables[:, sliding_cable.STIFFNESS] * model.cables[:, sliding_cable.REST]
+        given = np.where(by_tension, trial.length * ea / (ea + wanted), given)
+        start = trial.q
+    strung = with_rest_lengths(model, given)
+    return strung, weight, equilibrium(strung, np.zeros(len(routes)), weight, start)
+
+
+def build_robot(description: RobotDescription) -> Robot:
+    """Build the robot of ``description``.
+
+    Raises:
+        NoEquilibriumError: If the robot has no stable shape at zero drive.
+    """
+    model, weight, rest = _strung(description, undeformed(description))
+    low, high = description.stroke_mm
+    return Robot(
+        name=description.name,
+        cable_names=tuple(route.name for route in cable_routes(description)),
+        model=model,
+        weight=weight,
+        rest=rest,
+        tip=FIXED * description.tip.ring,
+        stroke=(low / 1000.0, high / 1000.0),
+        tension_limit=description.tension_limit_n,
+    )
+
+
+def mismatched(robot: Robot, springs: float = 1.0, cables: float = 1.0, density: float = 1.0) -> Robot:
+    """The same robot built of other material: factors on moduli and masses, same rest lengths, own rest shape.
+
+    Raises:
+        NoEquilibriumError: If that robot has no stable shape at zero drive.
+    """
+    model = scaled(robot.model, springs, cables, density)
+    weight = density * robot.weight
+    rest = equilibrium(model, np.zeros(robot.n_cables), weight, robot.rest.q)
+    return replace(robot, model=model, weight=weight, rest=rest)
