@@ -30,7 +30,8 @@ Attachments = Mapping[str, tuple[str, bytes]]
 
 def new_mcap(stream: IO[bytes]) -> Writer:
     """Writer with the header of our logs, zstd chunks of at most 1 MiB."""
-    writer = Writer(stream, compression=CompressionType.ZSTD)
+    # Offsets into the summary are optional, and mcap writes wrong ones for groups without entries.
+    writer = Writer(stream, compression=CompressionType.ZSTD, use_summary_offsets=False)
     writer.start(profile="", library=LIBRARY)
     return writer
 
@@ -61,6 +62,8 @@ class McapFile:
         self._events = 0
         self.steps = 0
         self.unflushed = 0
+        # Schemas and channels live in the first chunk, and a chunk needs a message: now all of it is on file.
+        self.event(Event(0.0, "log", "info", "log opened"))
         self.flush()
 
     def _register(self, geometry: LogGeometry) -> dict[str, int]:

@@ -78,6 +78,6 @@ def quaternion_of_normal(normal: Array) -> Array:
     return unit
 
 
-def finite(*arrays: NDArray[np.float64]) -> bool:
-    """True if every number of every array is finite."""
-    return all(bool(np.isfinite(array).all()) for array in arrays)
+def drawable(*arrays: NDArray[np.floating]) -> bool:
+    """True if every number is finite and below 1e6 m: what is not must neither be drawn nor overflow here."""
+    return all(bool((np.abs(array) < 1e6).all()) for array in arrays)

@@ -17,7 +17,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from tcrctl.log.geometry import NODES_PER_MODULE, LogGeometry
-from tcrctl.log.ring_frames import finite, quaternion_of_normal, ring_frames
+from tcrctl.log.ring_frames import drawable, quaternion_of_normal, ring_frames
 from tcrctl.log.scene import Scene
 from tcrctl.signals import Array, Measurement, Reference, StepRecord
 
@@ -74,14 +74,14 @@ class ViewerTopics:
             yield from self._poses(record, stamp(time_ns))
         if record.k % self._scene_stride == 0:
             shape, tension = _shape(record), _tension(record)
-            if shape.size == 3 * self._geometry.n_nodes and finite(shape):
+            if shape.size == 3 * self._geometry.n_nodes and drawable(shape):
                 yield "/scene", self._scene.encode(shape.reshape(-1, 3), tension, stamp(time_ns))
 
     def _poses(self, record: StepRecord, when: Timestamp) -> Iterator[tuple[str, bytes]]:
         shape = _shape(record)
         if shape.size == 3 * self._geometry.n_nodes:
             centre, turn = ring_frames(shape.reshape(-1, NODES_PER_MODULE, 3)[:, :3])
-            if finite(centre, turn):
+            if drawable(centre, turn):
                 yield "/tf", self._frames(centre, turn, when)
                 yield "/backbone", _backbone(centre, turn, when)
         measured = self._measured(record.measurement)
@@ -106,7 +106,7 @@ class ViewerTopics:
         if rows is None or max(rows) >= len(measurement.nodes) or not measurement.valid[rows].all():
             return None
         centre, turn = ring_frames(measurement.nodes[rows].astype(np.float64)[None])
-        return (centre[0], turn[0]) if finite(centre, turn) else None
+        return (centre[0], turn[0]) if drawable(centre, turn) else None
 
 
 def _shape(record: StepRecord) -> Array:
@@ -119,7 +119,7 @@ def _tension(record: StepRecord) -> Array:
 
 def _reference(reference: Reference) -> tuple[Array, Array] | None:
     normal = np.array([0.0, 0.0, 1.0]) if reference.normal is None else reference.normal
-    if reference.position.size != 3 or normal.size != 3 or not finite(reference.position, normal):
+    if reference.position.size != 3 or normal.size != 3 or not drawable(reference.position, normal):
         return None
     return reference.position, quaternion_of_normal(normal)
 

@@ -1,0 +1,315 @@
+"""Laws of a finished log: bit-exact round trip, layout, viewer topics."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import records
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from hypothesis import given, settings
+from mcap.reader import make_reader
+from mcap.records import Attachment, Channel, Message, Metadata
+from mcap.stream_reader import StreamReader
+from scipy.spatial.transform import Rotation
+
+from tcrctl.errors import InputError, LogError, UnknownNameError
+from tcrctl.log.codec import decode_step, encode
+from tcrctl.log.columns import COLUMNS
+from tcrctl.log.reader import read_log
+from tcrctl.log.ring_frames import quaternion_of_normal, quaternions, ring_frames
+from tcrctl.log.schema import descriptor_set, public_descriptor
+from tcrctl.log.viewer_topics import SCENE_RATE_HZ, VIEWER_RATE_HZ, stride
+from tcrctl.log.writer import LogWriter
+
+STOP = {"status": "success", "summary": json.dumps({"criteria": []})}
+
+
+def open_log(path, **options):
+    defaults = {
+        "attachments": records.ATTACHMENTS,
+        "start": records.START,
+        "geometry": records.geometry(),
+        "epoch_ns": records.EPOCH_NS,
+        "period_s": records.PERIOD_S,
+    }
+    return LogWriter(path, **(defaults | options))
+
+
+def doctor(path):
+    """Findings of an independent checker of the MCAP specification."""
+    command = [sys.executable, "-m", "pymcap_cli.cli", "doctor", "--format", "jsonl", str(path)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.fixture
+def finished(tmp_path):
+    path = tmp_path / "log.mcap"
+    with open_log(path, flush_steps=7) as log:
+        for k in range(40):
+            log.step(records.record(k))
+            if k == 20:
+                log.event(records.record(k).t, "limit", "warning", "cable c1 at its speed limit")
+        log.finish(STOP)
+    return path
+
+
+def reencoded_as_stored(name):
+    """Message class made from nothing but the schema bytes that the file holds."""
+    files = descriptor_pb2.FileDescriptorSet.FromString(descriptor_set(public_descriptor(name)))
+    pool = descriptor_pool.DescriptorPool()
+    for file in files.file:
+        pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(f"tcrctl.v1.{name}"))
+
+
+@given(records.steps())
+@settings(max_examples=80, deadline=None)
+def test_a_step_survives_encoding_bit_for_bit(step):
+    assert records.fingerprint(decode_step(encode("Step", step))) == records.fingerprint(step)
+
+
+@given(records.steps())
+@settings(max_examples=40, deadline=None)
+def test_the_stored_schema_gives_viewers_the_same_numbers(step):
+    seen = reencoded_as_stored("Step").FromString(encode("Step", step))
+    assert seen.k == step.k
+    np.testing.assert_array_equal(np.array(seen.estimate.q), step.estimate.q)
+    np.testing.assert_array_equal(np.array(seen.measurement.nodes), step.measurement.nodes.ravel())
+    assert list(seen.info.saturated) == step.info.saturated.tolist()
+    assert math.copysign(1.0, seen.timing.read) == math.copysign(1.0, step.timing.read) or math.isnan(
+        seen.timing.read
+    )
+    assert seen.HasField("truth") == (step.truth is not None)
+
+
+@given(records.steps())
+@settings(max_examples=25, deadline=None)
+def test_arbitrary_steps_survive_a_file_bit_for_bit(tmp_path_factory, step):
+    path = tmp_path_factory.mktemp("log") / "log.mcap"
+    with open_log(path) as log:
+        log.step(step)
+        log.finish(STOP)
+    assert [records.fingerprint(s) for s in read_log(path).steps()] == [records.fingerprint(step)]
+
+
+def test_an_array_of_another_type_is_refused_instead_of_cast(tmp_path):
+    wrong = records.record(0)
+    object.__setattr__(wrong.measurement, "nodes", wrong.measurement.nodes.astype(np.float64))
+    log = open_log(tmp_path / "log.mcap")
+    log.step(wrong)
+    with pytest.raises(LogError, match=r"Measurement\.nodes is float64"):
+        log.finish(STOP)
+
+
+def test_a_plain_mcap_reader_sees_every_step_once_in_order(finished):
+    with open(finished, "rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        messages = [message for _, _, message in reader.iter_messages("/tcrctl/step", log_time_order=False)]
+        metadata = {record.name: record.metadata for record in reader.iter_metadata()}
+        header = reader.get_header()
+    assert [message.sequence for message in messages] == list(range(40))
+    assert all(
+        message.log_time == records.EPOCH_NS + round(k * records.PERIOD_S * 1e9)
+        for k, message in enumerate(messages)
+    )
+    assert all(message.publish_time == message.log_time - 10_000_000 for message in messages)
+    assert metadata["tcrctl.run.start"]["run_id"] == records.START["run_id"]
+    assert metadata["tcrctl.run.stop"] == {"steps": "40", **STOP}
+    assert header.profile == ""
+    assert header.library.startswith("tcrctl/")
+
+
+def test_attachments_and_start_come_first_and_stop_last(finished):
+    kinds = []
+    with open(finished, "rb") as stream:
+        for record in StreamReader(stream).records:
+            if isinstance(record, Attachment | Metadata):
+                kinds.append(record.name)
+            elif isinstance(record, Message) and kinds[-1:] != ["messages"]:
+                kinds.append("messages")
+    assert kinds == [*records.ATTACHMENTS, "tcrctl.run.start", "messages", "tcrctl.run.stop"]
+
+
+def test_the_reader_gives_back_what_was_logged(finished):
+    log = read_log(finished)
+    assert log.complete
+    assert log.attachments == records.ATTACHMENTS
+    assert log.stop is not None
+    assert log.stop["status"] == "success"
+    assert log.node_names[:5] == ("base.n1", "base.n2", "base.n3", "base.apex", "m1.n1")
+    assert log.cable_names == ("c1", "c2", "c3")
+    assert [(e.kind, e.level, e.message) for e in log.events()] == [
+        ("log", "info", "log opened"),
+        ("limit", "warning", "cable c1 at its speed limit"),
+    ]
+    expected = [records.fingerprint(records.record(k)) for k in range(40)]
+    assert [records.fingerprint(step) for step in log.steps()] == expected
+
+
+def test_every_unit_of_the_step_is_in_the_channel_metadata(finished):
+    with open(finished, "rb") as stream:
+        channels = make_reader(stream).get_summary().channels.values()
+    step: Channel = next(channel for channel in channels if channel.topic == "/tcrctl/step")
+    for column in COLUMNS.values():
+        assert step.metadata.get(f"unit.{column.path}", "") == column.unit
+    derived = {channel.topic for channel in channels if channel.metadata.get("derived") == "true"}
+    assert derived == {"/log", "/tf", "/tip/measured", "/tip/reference", "/backbone", "/scene"}
+
+
+def test_an_independent_checker_finds_no_fault(finished, tmp_path):
+    assert doctor(finished).returncode == 0, doctor(finished).stdout
+    empty = tmp_path / "empty.mcap"
+    with open_log(empty) as log:
+        log.finish(STOP)
+    assert doctor(empty).returncode == 0, doctor(empty).stdout
+    assert list(read_log(empty).steps()) == []
+    assert read_log(empty).complete
+
+
+def test_columns_are_the_steps_stacked(finished):
+    log = read_log(finished)
+    columns = log.columns()
+    steps = list(log.steps())
+    assert set(columns) == set(COLUMNS)
+    np.testing.assert_array_equal(columns["estimate_q"], [step.estimate.q for step in steps])
+    np.testing.assert_array_equal(columns["k"], np.arange(40))
+    assert columns["measurement_nodes"].dtype == np.float32
+    assert columns["measurement_nodes"].shape == (40, 9, 3)
+    assert set(log.columns(["t", "truth_q"])) == {"t", "truth_q"}
+    with pytest.raises(UnknownNameError):
+        log.columns(["position_of_the_moon"])
+
+
+def test_columns_pad_what_some_steps_lack(tmp_path):
+    path = tmp_path / "log.mcap"
+    with_normal, without = records.record(0), records.record(1)
+    for name in ("normal", "ahead_normal"):
+        object.__setattr__(without.reference, name, None)
+    object.__setattr__(without, "truth", None)
+    with open_log(path) as log:
+        log.step(with_normal)
+        log.step(without)
+        log.finish(STOP)
+    columns = read_log(path).columns()
+    assert np.isnan(columns["reference_normal"][1]).all()
+    np.testing.assert_array_equal(columns["reference_normal"][0], with_normal.reference.normal)
+    assert np.isnan(columns["truth_q"][1]).all()
+
+
+@pytest.mark.parametrize("period", [1e-3, 4e-3, 1 / 60, 0.05, 0.2])
+def test_viewer_topics_stay_below_their_rates(period):
+    for rate in (VIEWER_RATE_HZ, SCENE_RATE_HZ):
+        steps_per_message = stride(period, rate)
+        assert 1 / (steps_per_message * period) <= rate * (1 + 1e-6)
+        assert steps_per_message == 1 or 1 / ((steps_per_message - 1) * period) > rate * (1 - 1e-6)
+
+
+def test_frames_on_tf_carry_ring_coordinates_to_the_world(finished):
+    steps = {step.k: step for step in read_log(finished).steps()}
+    checked = 0
+    for schema, message in _messages(finished, "/tf"):
+        assert schema.name == "foxglove.FrameTransforms"
+        shape = steps[message.sequence].truth.q.reshape(-1, 4, 3)
+        transforms = _decoded(schema, message).transforms
+        assert [frame.child_frame_id for frame in transforms] == ["base", "m1", "m2", "m3"]
+        for frame, module in zip(transforms, shape, strict=True):
+            rotation = Rotation.from_quat([getattr(frame.rotation, axis) for axis in "xyzw"])
+            origin = np.array([getattr(frame.translation, axis) for axis in "xyz"])
+            radius = np.linalg.norm(module[0] - module[:3].mean(axis=0))
+            np.testing.assert_allclose(rotation.apply([radius, 0, 0]) + origin, module[0], atol=3e-6)
+            assert rotation.apply([0, 0, 1])[2] > 0.9
+            checked += 1
+    assert checked == 4 * 40
+
+
+def test_the_scene_draws_every_rod_and_colours_cables_by_tension(finished):
+    steps = {step.k: step for step in read_log(finished).steps()}
+    scenes = list(_messages(finished, "/scene"))
+    assert [message.sequence for _, message in scenes] == list(range(0, 40, 2))
+    for schema, message in scenes:
+        assert schema.name == "foxglove.SceneUpdate"
+        entities = {entity.id: entity for entity in _decoded(schema, message).entities}
+        nodes = steps[message.sequence].truth.q.reshape(-1, 3)
+        rods = entities["rods"].lines[0]
+        points = np.array([[p.x, p.y, p.z] for p in rods.points])
+        np.testing.assert_allclose(points, nodes, atol=1e-6)
+        ends = np.array(rods.indices).reshape(-1, 2)
+        assert {tuple(pair) for pair in ends} == {(4 * i + j, 4 * i + 3) for i in range(4) for j in range(3)}
+        red = [entities[f"cable c{j}"].lines[0].color.r for j in (1, 2, 3)]
+        assert list(np.argsort(red)) == list(np.argsort(steps[message.sequence].truth.tension))
+        assert sum(name.startswith("ring ") for name in entities) == 4
+
+
+def test_an_unseen_end_marker_or_a_broken_shape_draws_nothing(tmp_path):
+    path = tmp_path / "log.mcap"
+    step = records.record(0)
+    step.measurement.valid[-1] = False
+    step.truth.q[5] = np.nan
+    with open_log(path) as log:
+        log.step(step)
+        log.finish(STOP)
+    for topic in ("/tip/measured", "/tf", "/backbone"):
+        assert list(_messages(path, topic)) == []
+    assert len(list(_messages(path, "/tip/reference"))) == 1
+
+
+def test_quaternions_are_those_of_an_independent_library():
+    turns = Rotation.random(500, rng=np.random.default_rng(1))
+    half_turns = Rotation.from_rotvec(np.pi * np.eye(3))
+    for rotation in (turns, half_turns):
+        ours = quaternions(rotation.as_matrix())
+        np.testing.assert_allclose(np.abs(np.sum(ours * rotation.as_quat(), axis=1)), 1.0, atol=1e-12)
+    for normal in [*Rotation.random(50, rng=np.random.default_rng(2)).apply([0, 0, 1]), [0, 0, -1.0]]:
+        turn = Rotation.from_quat(quaternion_of_normal(np.asarray(normal)))
+        np.testing.assert_allclose(turn.apply([0, 0, 1]), normal, atol=1e-7)
+
+
+def test_ring_frames_move_with_the_ring():
+    ring = records.shape(0.0, 0, np.random.default_rng(0)).reshape(4, 3)[:3]
+    turn, shift = Rotation.random(rng=np.random.default_rng(3)), np.array([0.1, -0.2, 0.3])
+    centre, quaternion = ring_frames((turn.apply(ring) + shift)[None])
+    np.testing.assert_allclose(centre[0], shift, atol=1e-15)
+    np.testing.assert_allclose((Rotation.from_quat(quaternion[0]) * turn.inv()).magnitude(), 0, atol=1e-7)
+
+
+def test_what_is_not_a_log_is_named_as_such(tmp_path):
+    from mcap.writer import Writer
+
+    foreign, text, nothing = (tmp_path / name for name in ("foreign.mcap", "text.mcap", "nothing.mcap"))
+    with open(foreign, "wb") as stream:
+        writer = Writer(stream)
+        writer.start(library="someone else")
+        writer.finish()
+    text.write_text("t,x\n0,1\n")
+    nothing.write_bytes(b"")
+    cases = {
+        foreign: "not a log of tcrctl",
+        text: "not an MCAP file",
+        nothing: "is empty",
+        tmp_path: "cannot be read",
+        tmp_path / "missing.mcap": "No such file",
+    }
+    for path, message in cases.items():
+        with pytest.raises(InputError, match=message) as caught:
+            read_log(path)
+        assert caught.value.exit_code == 2
+
+
+def _messages(path: Path, topic: str):
+    with open(path, "rb") as stream:
+        for schema, _, message in make_reader(stream).iter_messages(topic, log_time_order=False):
+            yield schema, message
+
+
+def _decoded(schema, message):
+    files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
+    pool = descriptor_pool.DescriptorPool()
+    for file in files.file:
+        pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name)).FromString(message.data)
