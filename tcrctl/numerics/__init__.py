@@ -1,0 +1,1 @@
+"""Numerical methods that know no robot: arrays in, arrays out, most of them numba kernels."""
