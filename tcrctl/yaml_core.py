@@ -29,6 +29,7 @@ MAX_DEPTH = 100  # a file nested deeper is a mistake or an attack, and would exh
 _TAG = "tag:yaml.org,2002:"
 _CORE_SCHEMA = (  # YAML 1.2.2, Sec. 10.3.2
     ("null", re.compile(r"null|Null|NULL|~|")),
+    ("merge", re.compile(r"<<")),  # of YAML 1.1, known here so that it can be refused as a key
     ("bool", re.compile(r"true|True|TRUE|false|False|FALSE")),
     ("int", re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")),
     ("float", re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")),
@@ -174,7 +175,7 @@ class Builder:
 def _key_problem(key: Node, first: dict[str, int]) -> str:
     if not isinstance(key, ScalarNode):
         return "a key must be text, not a map or list"
-    if key.value == "<<" and not key.style:
+    if key.tag == _TAG + "merge":
         return "merge keys are not supported; write the keys out"
     if key.tag != _TAG + "str":
         return f"a key must be text; write '{key.value}' in quotes"
@@ -183,7 +184,7 @@ def _key_problem(key: Node, first: dict[str, int]) -> str:
 
 def _scalar(kind: str, text: str) -> Any:
     """Return the value of a scalar; ValueError says why there is none."""
-    if kind == "str":
+    if kind in ("str", "merge"):
         return text
     if kind not in ("null", "bool", "int", "float"):
         raise ValueError(f"tag {kind!r} is not supported")

@@ -1,0 +1,199 @@
+"""Experiment files: shipped ones are valid, contradictions are refused where they stand."""
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
+
+from tcrctl import shipped, strict_yaml
+from tcrctl.criterion import RELATIONS, Criterion, CriterionText
+from tcrctl.errors import InputError, SpecError, UnknownNameError
+from tcrctl.spec import ExperimentSpec, LoadedSpec, load_spec
+
+SPEC = """\
+name: standing
+robot: tcr600
+trajectory: {kind: hold, duration_s: 1}
+controller: {kind: ioc}
+plant: {kind: simulated}
+"""
+
+
+def loaded(folder: Path, *overrides: str, text: str = SPEC) -> LoadedSpec:
+    path = folder / "standing.yaml"
+    path.write_text(text)
+    return load_spec(str(path), overrides)
+
+
+def problems_of(folder: Path, *overrides: str, text: str = SPEC) -> list[str]:
+    with pytest.raises(SpecError) as caught:
+        loaded(folder, *overrides, text=text)
+    return [str(problem).replace(str(folder), "") for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize("name", sorted(shipped.experiments()))
+def test_shipped_experiments_are_valid_and_survive_both_file_formats(name: str) -> None:
+    found = load_spec(name)
+    assert found.spec.name == name
+    assert found.spec.description
+    assert found.spec.source
+    assert found.given_text == shipped.experiments()[name].read_bytes()
+    assert ExperimentSpec.model_validate_json(found.spec.model_dump_json()) == found.spec
+    text = strict_yaml.dumps(found.spec.model_dump(mode="json"))
+    assert strict_yaml.validate(strict_yaml.loads(text), ExperimentSpec) == found.spec
+
+
+@pytest.mark.parametrize("section", ["controller.tension", "controller.integral", "plant.mismatch"])
+def test_a_section_that_is_off_stays_off_in_the_resolved_file(tmp_path: Path, section: str) -> None:
+    spec = loaded(tmp_path, f"{section}=off").spec
+    part, key = section.split(".")
+    assert getattr(getattr(spec, part), key) is None
+    again = ExperimentSpec.model_validate_json(spec.model_dump_json())
+    assert again == spec
+    assert spec.model_dump(mode="json")[part][key] == "off"
+
+
+def test_settings_cannot_be_changed_after_loading(tmp_path: Path) -> None:
+    spec = loaded(tmp_path).spec
+    with pytest.raises(ValidationError):
+        spec.controller.period_s = 1.0  # type: ignore[misc]
+
+
+def test_an_override_takes_part_in_every_check_and_is_remembered(tmp_path: Path) -> None:
+    found = loaded(tmp_path, "controller.period_s=1e-1", "plant.measured_rings=[8, 11]")
+    assert found.spec.controller.period_s == 0.1
+    assert found.spec.plant.measured_rings == (8, 11)
+    assert found.overrides == ("controller.period_s=1e-1", "plant.measured_rings=[8, 11]")
+    assert found.given_text == SPEC.encode()
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (
+            ["controller.horizon_s=0.01"],
+            "--set controller.horizon_s: must be at least period_s, 0.05, not 0.01",
+        ),
+        (
+            ["controller.period_s=1"],
+            "/standing.yaml:4:1: controller.horizon_s: must be at least period_s, 1, not 0.4",
+        ),
+        (["controller.blocks=9"], "--set controller.blocks: must be at most instants, 8, not 9"),
+        (["controller.instants=61"], "--set controller.instants: must be <= 60, not 61"),
+        (["controller.speed_limit_mm_s=0"], "--set controller.speed_limit_mm_s: must be > 0.0, not 0"),
+        (
+            ["controller.weights.normal=1"],
+            "--set controller.weights.normal: has no meaning with output: position",
+        ),
+        (["controller.output=pose"], "controller.weights.normal: must be > 0 with output: pose"),
+        (
+            ["controller.tension.floor_n=5"],
+            "--set controller.tension.floor_n: must be below reference_n, 5, not 5",
+        ),
+        (["controller.tension.ceiling_n=4"], "--set controller.tension.ceiling_n: must be above reference_n"),
+        (["controller.tension.ceiling_n=101"], "must be at most tension_limit_n of tcr600, 100, not 101"),
+        (
+            ["controller.tension=no"],
+            '--set controller.tension: must be off or a map of keys and values, not "no"',
+        ),
+        (["controller.modes=133"], "must be at most 132"),
+        (["controller.kind=open_lop"], "--set controller.kind: must be 'ioc'"),
+        (["estimator.kind=exakt"], "--set estimator.kind: must be one of 'passive_observer', 'exact'"),
+        (["estimator.kind=exakt"], "did you mean exact?"),
+        (
+            ["plant.step_ms=3"],
+            "--set plant.step_ms: a control period of 0.05 s must be a whole number of steps",
+        ),
+        (["plant.step_ms=100"], "must be a whole number of steps"),
+        (["plant.spectral_radius=1.1"], "must be <= 1"),
+        (["plant.noise_um=-1"], "must be >= 0"),
+        (["plant.mismatch={density: 0}"], "--set plant.mismatch: plant.mismatch.density: must be > 0"),
+        (["plant.measured_rings=[12]"], "there is no ring 12; tcr600 has rings 1 to 11"),
+        (["plant.measured_rings=[3, 3]"], "ring 3 is listed more than once"),
+        (["plant.measured_rings=[]"], "at least 1"),
+        (["plant.measured_rings=none"], "must be all or a list of ring numbers"),
+        (["robot=tcr60"], "--set robot: there is no robot named 'tcr60'; known: tcr5x4, tcr600, tcr700"),
+        (["robot=./robot.yaml"], "there is no such file"),
+        (["seed=-1"], "--set seed: must be >= 0, not -1"),
+        (["criteria=[a.b ~ 3]"], "--set criteria: criteria.0: must be name relation number"),
+        (["trajectory.kind=holt"], "--set trajectory.kind: must be one of"),
+        (["log.flush_steps=0"], "--set log.flush_steps: must be >= 1, not 0"),
+    ],
+)
+def test_contradictions_are_refused_where_they_stand(
+    tmp_path: Path, overrides: list[str], message: str
+) -> None:
+    (found,) = problems_of(tmp_path, *overrides)
+    assert message in found
+
+
+def test_problems_of_options_experiment_and_robot_are_listed_together(tmp_path: Path) -> None:
+    robot = shipped.robots()["tcr600"].read_text().replace("count: 11", "count: x")
+    (tmp_path / "own.yaml").write_text(robot)
+    text = SPEC.replace("tcr600", "./own.yaml").replace("kind: simulated", "kind: simulated, noise: 3")
+    found = problems_of(tmp_path, "name.first=x", "controller.period_s=.inf", text=text)
+    assert len(found) == 4
+    assert found[0].startswith("--set name.first")
+    assert found[1].startswith("--set controller.period_s: .inf is not a finite number")
+    assert found[2].startswith("/standing.yaml:5:26: plant.noise: unknown key; did you mean noise_um?")
+    assert found[3].startswith("/own.yaml:6:3: modules.count: must be a whole number")
+
+
+def test_a_robot_path_starts_at_the_experiment_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "own.yaml").write_bytes(shipped.robots()["tcr5x4"].read_bytes())
+    monkeypatch.chdir("/")
+    found = loaded(tmp_path, text=SPEC.replace("tcr600", "own.yaml"))
+    assert found.robot.name == "tcr5x4"
+    assert found.robot_path == tmp_path / "own.yaml"
+
+
+def test_experiments_that_do_not_exist_are_named_with_those_that_do(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError) as caught:
+        load_spec("leter_t")
+    assert caught.value.allowed == tuple(shipped.experiments())
+    assert "letter_t" in caught.value.hint
+    with pytest.raises(InputError, match="no such file"):
+        load_spec(str(tmp_path / "nothing.yaml"))
+
+
+names = st.from_regex(r"[a-z][a-z0-9_]{0,8}(\.[a-z0-9_]{1,8}){0,2}", fullmatch=True)
+limits = st.floats(allow_nan=False, allow_infinity=False) | st.booleans()
+criteria = st.builds(Criterion, names, st.sampled_from(sorted(RELATIONS)), limits)
+
+
+@given(criteria)
+def test_a_criterion_reads_back_what_it_writes(criterion: Criterion) -> None:
+    adapter: TypeAdapter[Criterion] = TypeAdapter(CriterionText)
+    assert adapter.validate_python(str(criterion)) == criterion
+    assert adapter.validate_json(adapter.dump_json(criterion)) == criterion
+
+
+@given(criteria, st.floats())
+def test_a_criterion_compares_as_it_reads_and_nan_meets_none(criterion: Criterion, value: float) -> None:
+    expected = eval(f"value {criterion.relation} criterion.limit") and not math.isnan(value)
+    assert criterion.holds(value) == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "a",
+        "a <= ",
+        "<= 3",
+        "a != 3",
+        "a =< 3",
+        "a <= 3 mm",
+        "A <= 3",
+        "a..b < 3",
+        "a < nan",
+        "a < 1e999",
+        "a <= b",
+    ],
+)
+def test_sentences_that_are_no_criterion_are_refused(text: str) -> None:
+    with pytest.raises(ValidationError, match="name relation number"):
+        TypeAdapter(CriterionText).validate_python(text)
