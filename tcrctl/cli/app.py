@@ -12,8 +12,11 @@ from typing import Annotated
 import typer
 
 from tcrctl import __version__
+from tcrctl.cli.export import export
+from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
+from tcrctl.cli.recover import recover
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
 from tcrctl.cli.validate import validate
@@ -25,6 +28,9 @@ VERBS: dict[str, Callable[..., None]] = {
     "validate": validate,
     "new": new,
     "schema": schema,
+    "info": info,
+    "recover": recover,
+    "export": export,
 }
 
 

@@ -16,7 +16,7 @@ metadata ``tcrctl.run.stop``, last     -                            status, reas
 =====================================  ===========================  =========================================
 
 Only ``/tcrctl/step`` and ``/tcrctl/event`` are the record of truth; all other topics are derived from them
-for viewers (channel metadata ``derived = true``) and rounded to 2^-20 m. A file without a footer is an
+for viewers (channel metadata ``derived = true``) and rounded. A file without a footer is an
 unfinished run: :func:`tcrctl.log.reader.read_log` reads it up to the last flush,
 :func:`tcrctl.log.recover.recover` mends it.
 """

@@ -17,6 +17,7 @@ _RING_SEGMENTS: Final = 24
 _RING_THICKNESS_M: Final = 0.003
 _ROD_THICKNESS_M: Final = 0.002
 _CABLE_THICKNESS_M: Final = 0.001
+_GRID: Final = 2.0**14  # coordinates are multiples of 0.06 mm: less than a pixel, and half the bytes
 
 
 class Scene:
@@ -72,5 +73,5 @@ def _line(
     line = entity.lines.add(type=kind, thickness=thickness)
     line.pose.orientation.w = 1.0
     line.color.r, line.color.g, line.color.b, line.color.a = *colour, 1.0
-    for x, y, z in (np.round(points * 2.0**20) / 2.0**20).tolist():
+    for x, y, z in (np.round(points * _GRID) / _GRID).tolist():
         line.points.add(x=x, y=y, z=z)

@@ -1,7 +1,8 @@
 """Topics derived from a step for viewers: frames, end poses, backbone and a 3-D scene.
 
-Nothing here is data: coordinates are rounded to 2^-20 m, which is far below what a screen shows and lets the
-compressor remove most of them. Where a shape is not finite (a diverged or unseen robot), nothing is drawn.
+Nothing here is data: poses are rounded to 2^-20 m, the scene more coarsely, which is far below what a screen
+shows and lets the compressor remove most of it. Where a shape is not finite (a diverged or unseen robot),
+nothing is drawn.
 """
 
 from __future__ import annotations

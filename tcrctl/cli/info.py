@@ -1,0 +1,78 @@
+"""``tcrctl info LOG``: what a log contains."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from tcrctl.cli.log_file import LogFile
+from tcrctl.cli.options import AsJson
+
+if TYPE_CHECKING:
+    from tcrctl.info import LogInfo, Spread
+
+
+def info(log: LogFile, as_json: AsJson = False) -> None:
+    """Show duration, timing, lost steps, outcome and provenance of a log, finished or not.
+
+    Examples:
+      tcrctl info logs/latest/log.mcap
+      tcrctl info log.mcap --json | jq .control_ms.p99
+    """
+    from tcrctl.info import inspect
+
+    found = inspect(log)
+    if as_json:
+        print(json.dumps(found.as_json()))
+    else:
+        _print_tables(found)
+
+
+def _print_tables(found: LogInfo) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    console = Console()
+    for title, rows in (("", _facts(found)), ("provenance", found.start), ("criteria", _criteria(found))):
+        if not rows:
+            continue
+        table = Table(title=title, title_justify="left", show_header=False, box=None)
+        table.add_column(style="bold", no_wrap=True)
+        table.add_column(overflow="fold")
+        for name, value in rows.items():
+            table.add_row(escape(name), escape(str(value)))
+        console.print(table)
+
+
+def _facts(found: LogInfo) -> dict[str, Any]:
+    complete = "yes" if found.complete else f"no; mend it with: tcrctl recover {found.path}"
+    rate = f" at {found.rate_hz:.4g} Hz" if found.rate_hz else ""
+    per_step = f", {found.bytes_per_step:.0f} per step" if found.bytes_per_step else ""
+    return {
+        "log": found.path,
+        "status": f"{found.status}{': ' if found.reason else ''}{found.reason}",
+        "complete": "recovered; the end may be missing" if found.recovered else complete,
+        "duration": f"{found.duration_s:.3f} s",
+        "steps": f"{found.steps}{rate}, {found.lost_steps} lost, {found.unconverged_steps} unconverged",
+        "jitter": _milliseconds(found.jitter_ms),
+        "control time": _milliseconds(found.control_ms),
+        "overruns": f"{found.overruns}; lateness {_milliseconds(found.lateness_ms)}",
+        "events": ", ".join(f"{count} {level}" for level, count in found.events.items()) or "none",
+        "attachments": ", ".join(found.attachments) or "none",
+        "size": f"{found.size_bytes} bytes{per_step}",
+    }
+
+
+def _milliseconds(spread: Spread | None) -> str:
+    if spread is None:
+        return "unknown"
+    return f"p50 {spread.p50:.3f} ms, p99 {spread.p99:.3f} ms, max {spread.max:.3f} ms"
+
+
+def _criteria(found: LogInfo) -> dict[str, str]:
+    return {
+        str(item.get("name")): f"{'passed' if item.get('passed') else 'FAILED'}: {item.get('value')} "
+        f"{item.get('unit') or ''}, limit {item.get('limit')}"
+        for item in found.criteria
+    }

@@ -1,0 +1,161 @@
+"""What a log contains: completeness, timing, outcome and provenance of a run."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import Counter
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcrctl.log.reader import Log, read_log
+
+_COLUMNS = ("k", "t", "period", "timing_control", "timing_lateness", "info_converged")
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Median, 99th percentile and maximum of a duration [ms]."""
+
+    p50: float
+    p99: float
+    max: float
+
+
+@dataclass(frozen=True, slots=True)
+class LogInfo:
+    """Facts about a log. What cannot be told of a log without steps is None.
+
+    Attributes:
+        path: The file.
+        size_bytes: Its size.
+        bytes_per_step: Size divided by steps.
+        complete: Stop record and index are there.
+        recovered: The file was made by a lossy ``tcrctl recover``.
+        status: ``success``, ``failed``, ``aborted``, ``error``, or ``unfinished`` without a stop record.
+        reason: Why, or empty.
+        steps: Steps that can be read.
+        lost_steps: Step indices missing between 0 and the last one.
+        duration_s: Time from the first step to the end of the last one [s].
+        rate_hz: Mean step rate [Hz].
+        period_s: Control period [s].
+        jitter_ms: Deviation of successive step times from the period.
+        overruns: Steps that began after their deadline (``timing.lateness`` > 0; always 0 if not paced).
+        lateness_ms: By how much.
+        control_ms: Duration of the controller.
+        unconverged_steps: Steps whose inner problem was not solved.
+        events: Number of events by level.
+        attachments: Names of the attached files.
+        start: Metadata of the start: who, when, what ran, versions.
+        summary: Result of the run as in ``run --json``; empty if it was not recorded.
+    """
+
+    path: str
+    size_bytes: int
+    bytes_per_step: float | None
+    complete: bool
+    recovered: bool
+    status: str
+    reason: str
+    steps: int
+    lost_steps: int
+    duration_s: float
+    rate_hz: float | None
+    period_s: float | None
+    jitter_ms: Spread | None
+    overruns: int
+    lateness_ms: Spread | None
+    control_ms: Spread | None
+    unconverged_steps: int
+    events: dict[str, int]
+    attachments: list[str]
+    start: dict[str, str]
+    summary: dict[str, Any]
+
+    @property
+    def criteria(self) -> list[dict[str, Any]]:
+        """Criteria of the run with value and verdict, as in ``run --json``."""
+        found = self.summary.get("criteria", [])
+        return [item for item in found if isinstance(item, dict)] if isinstance(found, list) else []
+
+    def as_json(self) -> dict[str, Any]:
+        """One object for ``info --json``; keys are the attributes, and ``criteria``."""
+        return {**asdict(self), "criteria": self.criteria}
+
+
+def inspect(path: str | os.PathLike[str]) -> LogInfo:
+    """Read a log and describe it.
+
+    Args:
+        path: The log, finished or not.
+
+    Raises:
+        InputError: If it is not a log of tcrctl.
+        LogError: If it is damaged inside.
+    """
+    log = read_log(path)
+    columns = log.columns(_COLUMNS)
+    steps = len(columns["k"])
+    size = log.path.stat().st_size
+    stop = log.stop or {"status": "unfinished", "reason": "the log has no stop record"}
+    return LogInfo(
+        path=str(log.path),
+        size_bytes=size,
+        bytes_per_step=size / steps if steps else None,
+        complete=log.complete,
+        recovered=stop.get("recovered") == "true",
+        status=stop.get("status", ""),
+        reason=stop.get("reason", ""),
+        steps=steps,
+        **_timing(columns),
+        unconverged_steps=int(np.count_nonzero(~columns["info_converged"])),
+        events=dict(Counter(event.level for event in log.events())),
+        attachments=list(log.attachments),
+        start=log.start,
+        summary=_summary(log),
+    )
+
+
+def _timing(columns: dict[str, NDArray[Any]]) -> dict[str, Any]:
+    k, t, lateness = columns["k"], columns["t"], columns["timing_lateness"]
+    if not len(k):
+        empty = {
+            "rate_hz": None,
+            "period_s": None,
+            "jitter_ms": None,
+            "lateness_ms": None,
+            "control_ms": None,
+        }
+        return {"lost_steps": 0, "duration_s": 0.0, "overruns": 0, **empty}
+    gaps, elapsed = np.diff(k), np.diff(t)
+    deviation = np.abs(elapsed - columns["period"][:-1])[gaps == 1]
+    span = float(t[-1] - t[0])
+    return {
+        "lost_steps": int(k.max()) + 1 - len(np.unique(k)),
+        "duration_s": span + float(columns["period"][-1]),
+        "rate_hz": float(k[-1] - k[0]) / span if span > 0.0 else None,
+        "period_s": float(np.median(columns["period"])),
+        "jitter_ms": _spread(deviation),
+        "overruns": int(np.count_nonzero(lateness > 0.0)),
+        "lateness_ms": _spread(lateness),
+        "control_ms": _spread(columns["timing_control"]),
+    }
+
+
+def _spread(seconds: NDArray[np.float64]) -> Spread | None:
+    known = seconds[np.isfinite(seconds)]
+    if not len(known):
+        return None
+    median, high, most = (1e3 * np.quantile(known, [0.5, 0.99, 1.0])).tolist()
+    return Spread(median, high, most)
+
+
+def _summary(log: Log) -> dict[str, Any]:
+    try:
+        summary = json.loads((log.stop or {}).get("summary", "{}"))
+    except ValueError:
+        return {}
+    return summary if isinstance(summary, dict) else {}
