@@ -107,6 +107,21 @@ def test_an_array_of_another_type_is_refused_instead_of_cast(tmp_path):
         log.finish(STOP)
 
 
+@pytest.mark.parametrize("t", [np.nan, np.inf, 1e300, -1e300])
+def test_a_measurement_without_a_sane_time_keeps_it_and_a_step_without_one_is_refused(tmp_path, t):
+    step = records.record(0)
+    object.__setattr__(step.measurement, "t", t)
+    with open_log(tmp_path / "good.mcap") as log:
+        log.step(step)
+        log.finish(STOP)
+    assert [records.fingerprint(s) for s in read_log(log.path).steps()] == [records.fingerprint(step)]
+    object.__setattr__(step, "t", t)
+    log = open_log(tmp_path / "bad.mcap")
+    log.step(step)
+    with pytest.raises(LogError, match="not a time"):
+        log.finish(STOP)
+
+
 def test_a_plain_mcap_reader_sees_every_step_once_in_order(finished):
     with open(finished, "rb") as stream:
         reader = make_reader(stream, validate_crcs=True)

@@ -96,7 +96,8 @@ class McapFile:
         Raises:
             ValueError: If ``t`` is not finite or outside what the file can hold.
         """
-        if not math.isfinite(t) or not 0 <= (time := self._epoch_ns + round(t * 1e9)) < 2**64:
+        nanoseconds = t * 1e9  # infinite for a huge t
+        if not math.isfinite(nanoseconds) or not 0 <= (time := self._epoch_ns + round(nanoseconds)) < 2**64:
             raise ValueError(f"t = {t} s is not a time the log can hold")
         return time
 
