@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import records
 import typer
-from test_log import open_log
+from log_files import open_log
 from typer.testing import CliRunner
 
 from tcrctl.cli.export import export
