@@ -171,7 +171,9 @@ def quaternion_slerp(start: Array, end: Array, fraction: Array) -> Array:
     rotation = quaternion_log(quaternion_multiply(end, quaternion_conjugate(start)))
     result = np.empty((fraction.size, 4))
     for i in range(fraction.size):
-        result[i] = quaternion_multiply(quaternion_exp(fraction[i] * rotation), start)
+        turned = quaternion_multiply(quaternion_exp(fraction[i] * rotation), start)
+        for j in range(4):
+            result[i, j] = turned[j]
     return result
 
 

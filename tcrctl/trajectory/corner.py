@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 from itertools import pairwise
@@ -63,12 +64,9 @@ def rounding(before: PlanePiece, after: PlanePiece, radius: float) -> Rounding |
         middle = 0.5 * (low + high)
         low, high = (middle, high) if clearance(middle) < 0.0 else (low, middle)
     tail, head = high, after.nearest(centre(high))
-    if not 0.0 <= head <= 0.5 * after.length:
-        return None
     start, tangent = before.point(before.length - tail), before.direction(before.length - tail)
-    turn = PlanePiece(start, tangent, side / radius, 0.0)
-    sweep = side * turn_angle(turn, after.trimmed(head, 0.0))
-    if sweep <= 0.0:  # neighbours that curve more tightly the other way leave no arc, only a loop
+    sweep = side * cmath.phase(after.direction(head) / tangent)
+    if not (0.0 <= head <= 0.5 * after.length and sweep > 0.0):
         return None
     return Rounding(PlanePiece(start, tangent, side / radius, radius * sweep), tail, head)
 

@@ -21,6 +21,9 @@ from .time_law import Phase, TimeLaw
 class StrokesTrajectory:
     """Rest, then approach, strokes and travel moves, each from rest to rest along its path.
 
+    Position and velocity are continuous, the acceleration along the path too; across the path it jumps by
+    speed^2 / radius where a line runs into an arc, as it must on such a path.
+
     Attributes:
         path: Everything that is travelled, as one path.
         time_law: Arc length on it over time.
