@@ -56,6 +56,11 @@ def node_index(name: str) -> int:
     return FIXED * number + {"n1": 0, "n2": 1, "n3": 2, "apex": APEX}[node]
 
 
+def ring_rows(n_modules: int) -> list[int]:
+    """Node rows of all ring nodes of the free modules, in order."""
+    return [FIXED * ring + k for ring in range(1, n_modules + 1) for k in range(3)]
+
+
 def _stack(d: RobotDescription) -> Array:
     """Node positions of the straight, undeformed stack (n_nodes, 3) [m]."""
     radius, pitch = d.modules.ring_diameter_mm / 2000.0, d.modules.pitch_mm / 1000.0

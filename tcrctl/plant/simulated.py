@@ -1,0 +1,90 @@
+"""Simulated plant: the robot's DAE under generalized-alpha, watched by noisy, late cameras."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcrctl.errors import DivergenceError
+from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.robot import dynamics, pose
+from tcrctl.robot.equations import make_workspace
+from tcrctl.robot.model import FIXED, ring_rows
+from tcrctl.robot.robot import Robot, mismatched
+from tcrctl.signals import Array, Command, Measurement, Truth
+
+
+class SimulatedPlant:
+    """One robot in simulation.
+
+    Attributes:
+        robot: The (possibly mismatched) robot that moves.
+        time: Simulated time [s].
+    """
+
+    def __init__(self, settings: SimulatedSettings, robot: Robot, period: float, seed: int) -> None:
+        factors = settings.mismatch
+        if factors is not None:
+            robot = mismatched(
+                robot, factors.springs_youngs_modulus, factors.cables_youngs_modulus, factors.density
+            )
+        self.robot, self.period, self.time = robot, period, 0.0
+        self._step, self._rho = settings.step_ms / 1000.0, settings.spectral_radius
+        self._latency, self._noise = settings.latency_ms / 1000.0, settings.noise_um * 1e-6
+        self._random = np.random.default_rng(seed)
+        self._state = dynamics.rest_state(robot.rest.q, np.zeros(robot.n_cables))
+        self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
+        self._work.tension[:] = robot.rest.tension
+        self._rows = np.array(ring_rows(robot.n_modules))
+        rings = range(1, robot.n_modules + 1) if settings.measured_rings == "all" else settings.measured_rings
+        self._valid = np.isin(self._rows // FIXED, list(rings))
+        self._delayed = self._state.q.copy()
+
+    def read(self) -> Measurement:
+        """Ring nodes as they were one latency ago, with noise, in single precision; drives as they are."""
+        nodes = self._delayed.reshape(-1, 3)[self._rows]
+        nodes = nodes + self._noise * self._random.standard_normal(nodes.shape)
+        return Measurement(
+            t=self.time - min(self._latency, self.time),
+            nodes=nodes.astype(np.float32),
+            valid=self._valid.copy(),
+            drive=self._state.drive.copy(),
+        )
+
+    def write(self, command: Command) -> Command:
+        """Move the drives at ``command.speed`` for one period; drives stop at the ends of their stroke.
+
+        Raises:
+            DivergenceError: If a time step did not converge.
+        """
+        low, high = self.robot.stroke
+        before = self._state.drive
+        drive = np.clip(before + self.period * command.speed, low, high)
+        applied = Command((drive - before) / self.period, drive)
+        late = min(self._latency, self.period)
+        self._advance(applied.speed, self.period - late)
+        self._delayed = self._state.q.copy()
+        self._advance(applied.speed, late)
+        self.time += self.period
+        self._state.drive[:] = drive  # the sum of many sub-steps differs from it by rounding
+        return applied
+
+    def _advance(self, speed: Array, duration: float) -> None:
+        converged, residual, smallest, _ = dynamics.advance(
+            self.robot.model, self._state, speed, duration, self._step, self._rho, self.robot.weight,
+            self._work, self._scratch,
+        )  # fmt: skip
+        if not converged:
+            raise DivergenceError(self.time, residual, smallest)
+
+    def truth(self) -> Truth:
+        """True end pose, tensions and shape now."""
+        q = self._state.q
+        return Truth(
+            position=pose.position(q, self.robot.tip),
+            normal=pose.normal(q, self.robot.tip),
+            tension=self._work.tension.copy(),
+            q=q.copy(),
+        )
+
+    def close(self) -> None:
+        """Nothing to leave safe in simulation."""
