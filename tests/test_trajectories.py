@@ -1,124 +1,28 @@
-import cmath
 import itertools
-import json
 import math
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
-from pydantic import RootModel
-
-from tcrctl import strict_yaml
-from tcrctl.trajectory.corner import rounding
-from tcrctl.trajectory.plane_curve import PlanePiece, turn_angle
-from tcrctl.trajectory.settings import TrajectorySettings
-from tcrctl.trajectory.strokes import moves
-from tcrctl.trajectory.trajectory import build_trajectory, sample_reference
-from tcrctl.validation import check
-
-REST = np.array([0.004, -0.003, -0.6])
-UP = np.array([0.0, 0.0, 1.0])
-DT = 0.005
-LETTERS = ["letter_i", "heart", "letter_d", "letter_u", "letter_t"]
-EXPERIMENTS = Path(__file__).parents[1] / "experiments"
-
-
-class Section(RootModel[TrajectorySettings]):
-    pass
-
-
-law = settings(deadline=None, max_examples=40)
-
-
-def parsed(section):
-    return Section.model_validate_json(json.dumps(section)).root
-
-
-def drawing(*strokes, **keys):
-    return parsed({"kind": "strokes", "strokes": list(strokes), "corner_angle_deg": 0, **keys})
-
-
-def built(section):
-    return build_trajectory(section, REST, UP)
-
-
-def at_start(x, y, **keys):
-    """Keys that put the drawing's first point (x, y) on the rest position: no approach."""
-    return {"plane": {"offset_mm": [-x, -y, 0]}, "lead_in_s": 0.0, **keys}
-
-
-def sampled(trajectory, dt=DT):
-    t = np.arange(0.0, trajectory.duration + dt, dt)
-    return t, trajectory.position(t)
-
-
-def in_plane_mm(position, section):
-    return 1e3 * (position - REST) - np.array(section.plane.offset_mm)
-
-
-coordinates = st.integers(-60, 60).map(float)
-points = st.tuples(coordinates, coordinates)
-
-
-@st.composite
-def polylines(draw):
-    line = draw(st.lists(points, min_size=2, max_size=6))
-    assume(all(a != b for a, b in itertools.pairwise(line)))
-    return {"line": line}
-
-
-@st.composite
-def arcs(draw):
-    start = draw(st.integers(-360, 360))
-    sweep = draw(st.integers(5, 500)) * draw(st.sampled_from([-1, 1]))
-    radius = draw(st.integers(1, 60))
-    return {"arc": {"center": draw(points), "radius": radius, "from_deg": start, "to_deg": start + sweep}}
-
-
-@st.composite
-def tangent_paths(draw):
-    """A line into an arc into a line, without corners, somewhere on the sheet."""
-    heading, radius = draw(st.integers(0, 359)), draw(st.integers(2, 50))
-    left, sweep = draw(st.sampled_from([-1, 1])), draw(st.integers(10, 300))
-    first, last = draw(st.integers(1, 60)), draw(st.integers(1, 60))
-    before = cmath.exp(1j * math.radians(heading))
-    after = before * cmath.exp(1j * math.radians(left * sweep))
-    centre = left * 1j * before * radius
-    end = centre - left * 1j * after * radius
-    arc_from = heading - left * 90
-    return {
-        "path": [
-            {"line": [pair(-first * before), [0, 0]]},
-            {
-                "arc": {
-                    "center": pair(centre),
-                    "radius": radius,
-                    "from_deg": arc_from,
-                    "to_deg": arc_from + left * sweep,
-                }
-            },
-            {"line": [pair(end), pair(end + last * after)]},
-        ]
-    }
-
-
-def pair(z):
-    return [z.real, z.imag]
-
-
-limits = st.fixed_dictionaries(
-    {
-        "speed_limit_mm_s": st.floats(1.0, 60.0),
-        "travel_speed_limit_mm_s": st.floats(5.0, 60.0),
-        "acceleration_limit_mm_s2": st.floats(5.0, 100.0),
-        "ramp_s": st.floats(0.2, 2.0),
-    }
+from drawings import (
+    DT,
+    REST,
+    arcs,
+    at_start,
+    built,
+    drawing,
+    drawings,
+    in_plane_mm,
+    law,
+    limits,
+    polylines,
+    sampled,
+    tangent_paths,
+    to_edge,
 )
-drawings = st.lists(st.one_of(polylines(), arcs(), tangent_paths()), min_size=1, max_size=2)
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tcrctl.trajectory.strokes import moves
 
 
 @law
@@ -180,11 +84,6 @@ def test_a_polyline_passes_through_every_vertex_and_never_leaves_its_edges(strok
         assert np.linalg.norm(drawn - corner, axis=1).min() <= limit["acceleration_limit_mm_s2"] * DT**2
     distance = np.min([to_edge(drawn, a, b) for a, b in itertools.pairwise(corners)], axis=0)
     assert distance.max() < 1e-9
-
-
-def to_edge(position, a, b):
-    along = np.clip((position - a) @ (b - a) / np.dot(b - a, b - a), 0.0, 1.0)
-    return np.linalg.norm(position - a - along[:, None] * (b - a), axis=1)
 
 
 @law
@@ -268,67 +167,6 @@ def test_a_stroke_slows_down_for_a_tight_arc_only():
 
 
 @law
-@given(st.integers(6, 150), st.sampled_from([-1, 1]), st.floats(0.5, 5.0))
-def test_rounding_leaves_a_corner_by_exactly_what_the_arc_cuts_off(turn, side, radius):
-    edge = 60.0
-    end = edge * (1.0 + cmath.exp(1j * math.radians(side * turn)))
-    section = drawing(
-        {"line": [[0, 0], [edge, 0], pair(end)]},
-        corner="round",
-        corner_radius_mm=radius,
-        corner_angle_deg=5,
-        acceleration_limit_mm_s2=100.0,
-        **at_start(0, 0),
-    )
-    trajectory = built(section)
-    s = np.linspace(0.0, trajectory.time_law.arc_length(np.array([1e9]))[0], 4001)
-    drawn = in_plane_mm(trajectory.path.position(s), section)[:, :2]
-    sharp = np.array([[0, 0], [edge, 0], pair(end)])
-    cut = radius * (1.0 / math.cos(math.radians(turn) / 2) - 1.0)
-    if radius * math.tan(math.radians(turn) / 2) > edge / 2:
-        cut = 0.0  # no room: the corner stays
-    away = np.min([to_edge(drawn, a, b) for a, b in itertools.pairwise(sharp)], axis=0).max()
-    assert np.linalg.norm(drawn - sharp[1], axis=1).min() == pytest.approx(cut, abs=0.02)
-    assert away <= cut + 1e-9
-
-
-@st.composite
-def pieces_at_a_corner(draw):
-    """Two pieces, straight or curved, that meet in 0."""
-    curvature = st.one_of(st.just(0.0), st.floats(0.02, 0.5), st.floats(-0.5, -0.02))
-    length = st.floats(1.0, 40.0)
-    turn = math.radians(draw(st.integers(5, 179))) * draw(st.sampled_from([-1, 1]))
-    back = PlanePiece(0j, -1.0 + 0j, -draw(curvature), draw(length))  # the first one, walked backwards
-    before = PlanePiece(back.point(back.length), -back.direction(back.length), -back.curvature, back.length)
-    return before, PlanePiece(0j, cmath.exp(1j * turn), draw(curvature), draw(length))
-
-
-@settings(deadline=None, max_examples=200)
-@given(pieces_at_a_corner(), st.floats(0.2, 6.0))
-def test_a_rounding_arc_is_tangent_to_whatever_meets_in_the_corner(pieces, radius):
-    before, after = pieces
-    found = rounding(before, after, radius)
-    assume(found is not None)
-    head, tail = before.trimmed(0.0, found.tail), after.trimmed(found.head, 0.0)
-    assert head.length >= before.length / 2 - 1e-9
-    assert tail.length >= after.length / 2 - 1e-9
-    for first, second in ((head, found.arc), (found.arc, tail)):
-        assert abs(first.point(first.length) - second.start) < 1e-8
-        assert abs(turn_angle(first, second)) < 1e-6
-    assert abs(found.arc.curvature) == pytest.approx(1.0 / radius)
-    assert 0.0 < found.arc.length < math.pi * radius * (1 + 1e-9)
-
-
-@pytest.mark.parametrize("turn", [-60, 60])
-@pytest.mark.parametrize("curvatures", list(itertools.product([-0.02, 0.0, 0.02], repeat=2)))
-def test_a_corner_with_room_on_both_sides_is_rounded_whatever_meets_there(turn, curvatures):
-    back = PlanePiece(0j, -1.0 + 0j, -curvatures[0], 40.0)
-    before = PlanePiece(back.point(40.0), -back.direction(40.0), curvatures[0], 40.0)
-    after = PlanePiece(0j, cmath.exp(1j * math.radians(turn)), curvatures[1], 40.0)
-    assert rounding(before, after, 3.0) is not None
-
-
-@law
 @given(drawings, st.integers(0, 359), st.integers(-89, 89))
 def test_turning_the_plane_turns_the_drawing(strokes, azimuth, tilt):
     a, b = math.radians(azimuth), math.radians(tilt)
@@ -343,102 +181,3 @@ def test_turning_the_plane_turns_the_drawing(strokes, azimuth, tilt):
     assert turned.duration == pytest.approx(flat.duration)
     expected = REST + np.outer(x, x_axis) + np.outer(y, y_axis)
     assert np.allclose(turned.position(t), expected, atol=1e-9)
-
-
-@pytest.mark.parametrize("name", LETTERS)
-def test_each_letter_is_drawn_in_its_plane_inside_the_workspace(name):
-    section, problems = check(strict_yaml.load(EXPERIMENTS / f"{name}.yaml").data["trajectory"], Section)
-    assert problems == []
-    trajectory = built(section.root)
-    assert 30.0 <= trajectory.duration <= 60.0
-    _, position = sampled(trajectory)
-    drawn = in_plane_mm(position, section.root)
-    assert np.hypot(drawn[:, 0], drawn[:, 1]).max() <= 50.0 + 1e-6
-    on_paper = drawn[np.abs(drawn[:, 2]) < 1e-6]
-    height = on_paper[:, 1].max() - on_paper[:, 1].min()
-    assert 75.0 <= height <= 100.0
-    for stroke in section.root.strokes:
-        for segment in stroke.segments:
-            for corner in segment.line or segment.ends:
-                assert np.linalg.norm(on_paper[:, :2] - corner, axis=1).min() < 10 * DT
-
-
-def test_the_sides_of_the_heart_touch_its_arcs_without_a_corner():
-    section, _ = check(strict_yaml.load(EXPERIMENTS / "heart.yaml").data["trajectory"], Section)
-    runs = [move for move in moves(section.root, REST) if move.pieces]
-    # approach, tip to cusp, cusp to tip
-    assert [len(move.pieces) for move in runs] == [1, 2, 2]
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"strokes": []}, "at least 1 item"),
-        ({"strokes": [{}]}, "exactly one of line, arc, path; given: none"),
-        ({"strokes": [{"line": [[0, 0]]}]}, "at least 2 points"),
-        ({"strokes": [{"line": [[0, 0], [1, 1], [1, 1]]}]}, "points 2 and 3 are the same"),
-        ({"strokes": [{"path": []}]}, "at least 1 item"),
-        (
-            {"strokes": [{"path": [{"line": [[0, 0], [1, 0]]}, {"line": [[1, 2e-6], [2, 0]]}]}]},
-            "segment 2 starts at",
-        ),
-        ({"strokes": [{"arc": {"center": [0, 0], "radius": 0, "from_deg": 0, "to_deg": 9}}]}, "> 0"),
-        ({"strokes": [{"arc": {"center": [0, 0], "radius": 1, "from_deg": 9, "to_deg": 9}}]}, "no length"),
-        ({"speed_limit_mm_s": 0}, "> 0"),
-        ({"ramp_s": -1}, "> 0"),
-        ({"speed_limit": 3}, "unknown key"),
-        ({"corner": "cut"}, "'stop' or 'round'"),
-        ({"plane": {"x_axis": [1, 0, 0.1]}}, "must have length 1"),
-        ({"plane": {"y_axis": [1, 0, 0]}}, "perpendicular"),
-        ({"kind": "stroke"}, "'strokes', 'hold'"),
-    ],
-)
-def test_what_cannot_be_drawn_is_said(change, said):
-    good = {"kind": "strokes", "strokes": [{"line": [[0, 0], [1, 0]]}]}
-    assert check(good, Section)[1] == []
-    _, problems = check({**good, **change}, Section)
-    assert len(problems) == 1
-    assert said in problems[0][1]
-
-
-@pytest.mark.parametrize("end", [[100, 0], [0, 100], [60, 80], [-60, 80]])
-def test_rounded_axes_are_made_orthonormal(end):
-    plane = {"x_axis": [0.7071, 0.7071, 0.0], "y_axis": [-0.7076, 0.7066, 0.0]}
-    trajectory = built(drawing({"line": [[0, 0], end]}, plane=plane))
-    reached = trajectory.position(np.array([trajectory.duration]))[0]
-    assert np.linalg.norm(reached - REST) == pytest.approx(0.1, rel=1e-12)
-
-
-@pytest.mark.parametrize("orientation", ["free", "rest"])
-def test_hold_stands_still_at_its_offset_for_its_duration(orientation):
-    section = parsed({"kind": "hold", "duration_s": 4, "offset_mm": [5, 0, 10], "orientation": orientation})
-    trajectory = built(section)
-    t = np.array([-1.0, 0.0, 2.0, 9.0])
-    assert trajectory.duration == 4.0
-    assert np.allclose(trajectory.position(t), REST + np.array([0.005, 0.0, 0.010]), atol=1e-15)
-    normal = trajectory.normal(t)
-    assert normal is None if orientation == "free" else np.array_equal(normal, np.tile(UP, (4, 1)))
-
-
-@pytest.mark.parametrize(
-    "section",
-    [
-        {"kind": "hold", "duration_s": 1, "orientation": "rest"},
-        {"kind": "strokes", "strokes": [{"line": [[0, 0], [50, 0]]}]},
-    ],
-)
-def test_a_reference_holds_the_target_now_and_ahead(section):
-    trajectory = built(parsed(section))
-    ahead = np.array([2.1, 2.4, 99.0])
-    reference = sample_reference(trajectory, 2.0, ahead)
-    assert reference.t == 2.0
-    assert np.array_equal(reference.position, trajectory.position(np.array([2.0]))[0])
-    assert np.array_equal(reference.ahead_position, trajectory.position(ahead))
-    assert (reference.normal is None) == (reference.ahead_normal is None) == (section["kind"] == "strokes")
-
-
-def test_reading_settings_needs_no_numerical_library():
-    heavy = "{'numpy', 'scipy', 'numba'} & set(sys.modules)"
-    program = f"import sys, tcrctl.trajectory.settings; print({heavy} or 'none')"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "none"
