@@ -83,8 +83,6 @@ def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Key
     if tension is not None and tension.ceiling_n > robot.tension_limit_n:
         limit = f"tension_limit_n of {robot.name}, {robot.tension_limit_n:g}"
         yield ("controller", "tension", "ceiling_n"), f"must be at most {limit}, not {tension.ceiling_n:g}"
-    if spec.controller.modes > 12 * count:
-        yield ("controller", "modes"), f"must be at most {12 * count}, all coordinates of {robot.name}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,29 +53,39 @@ class IntegralSettings(Settings):
     limit_deg: float = quantity("deg", "largest tilt of the target normal; output: pose only", 10.0, gt=0)
 
 
+class OffsetSettings(Settings):
+    """Estimates where the robot would come to rest, as opposed to where the model would."""
+
+    filter_s: float = quantity("s", "time constant of the estimate", 0.5, gt=0)
+
+
 class IocSettings(Settings):
     """Instantaneous optimal control (30)-(41) with a prediction horizon of its own."""
 
     kind: Literal["ioc"]
     output: Literal["position", "pose"] = Field(default="position", description="what is tracked")
     period_s: float = quantity("s", "control period", 0.05, gt=0, le=10)
-    horizon_s: float = quantity("s", "prediction horizon, at least one period", 0.4, gt=0, le=60)
-    prediction: Literal["modal", "backward_euler", "generalized_alpha"] = Field(
-        default="modal", description="how the end of the horizon is predicted; the last two as one step"
+    horizon_s: float = quantity("s", "prediction horizon, at least one period", 0.8, gt=0, le=60)
+    prediction: Literal["multi_step", "one_step", "literal"] = Field(
+        default="multi_step",
+        description="multi_step: linear response over the horizon; one_step: one backward-Euler step as long "
+        "as the horizon; literal: the paper's Algorithm 1, one generalized-alpha step of one period",
     )
     instants: int = Field(
-        default=8,
+        default=16,
         ge=1,
         le=60,
-        description="equally spaced prediction instants in the horizon; prediction: modal only",
+        description="equally spaced prediction instants in the horizon; prediction: multi_step only",
     )
     blocks: int = Field(
         default=4,
         ge=1,
-        le=60,
-        description="piecewise constant inputs over the horizon; prediction: modal only",
+        le=12,
+        description="piecewise constant inputs over the horizon; prediction: multi_step only",
     )
-    modes: int = Field(default=12, ge=1, description="modes kept in the prediction; prediction: modal only")
+    offset: OrOff[OffsetSettings] = Field(
+        default=OffsetSettings(), description="offset of the equilibrium, or off; prediction: multi_step only"
+    )
     weights: CostWeights = Field(default=CostWeights(), description="weights of the cost (30)")
     tension: OrOff[TensionSettings] = Field(
         default=TensionSettings(), description="keeps cables taut, or off"
@@ -93,7 +103,9 @@ class IocSettings(Settings):
     def _disagreements(self) -> Iterator[tuple[Path, str]]:
         if self.horizon_s < self.period_s:
             yield ("horizon_s",), f"must be at least period_s, {self.period_s:g}, not {self.horizon_s:g}"
-        if self.prediction == "modal" and self.blocks > self.instants:
+        if self.prediction == "multi_step" and self.horizon_s / self.instants > 0.25:
+            yield ("instants",), "must be so many that instants lie at most 0.25 s apart"
+        if self.prediction == "multi_step" and self.blocks > self.instants:
             yield ("blocks",), f"must be at most instants, {self.instants}, not {self.blocks}"
         if self.output == "position":
             for key in ("normal", "twist"):

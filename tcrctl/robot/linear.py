@@ -54,7 +54,7 @@ def factor_shifted(K: Array, U: Array) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _solve_columns(ws: Workspace, b: Array) -> None:
+def couple(ws: Workspace, b: Array) -> None:
     """columns = K^-1 [G' R, b];  small = Cholesky factor of P = I + R G Y R."""
     m, size = ws.axial.shape[0], b.shape[0]
     X = ws.columns
@@ -86,7 +86,7 @@ def solve(ws: Workspace, b: Array, x: Array) -> None:
         b: Right-hand side (12 n_modules,).
         x: Output (12 n_modules,).
     """
-    _solve_columns(ws, b)
+    couple(ws, b)
     m = ws.axial.shape[0]
     weight = np.zeros((m, 1))
     for c in range(m):

@@ -37,6 +37,24 @@ def normal(q: Array, ring: int) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
+def twist(q: Array, ring: int) -> float:
+    """Rotation [rad] of the ring about its normal against the shortest rotation from rest (node 1 on +x)."""
+    n, y = normal(q, ring), position(q, ring)
+    arm, ahead = np.empty(3), np.empty(3)
+    for a in range(3):
+        arm[a] = q[3 * ring + a] - y[a]
+    # shortest rotation of e_x that takes e_z to n: Rodrigues with axis e_z x n
+    scale = n[0] / (1.0 + n[2])
+    ahead[0], ahead[1], ahead[2] = 1.0 - scale * n[0], -scale * n[1], -n[0]
+    along, across = 0.0, 0.0
+    for a in range(3):
+        i, j = (a + 1) % 3, (a + 2) % 3
+        along += ahead[a] * arm[a]
+        across += n[a] * (ahead[i] * arm[j] - ahead[j] * arm[i])
+    return np.arctan2(across, along)
+
+
+@njit(cache=True, error_model="numpy")
 def output_matrix(q: Array, ring: int) -> Array:
     """Derivatives (7, 9) of position, normal and twist with respect to the ring's nine coordinates.
 

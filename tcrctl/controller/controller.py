@@ -1,0 +1,32 @@
+"""What the loop needs of a controller, and which kinds there are."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from tcrctl.controller.instantaneous import InstantaneousOptimalControl
+from tcrctl.controller.literal import LiteralIoc
+from tcrctl.controller.settings import ControllerSettings
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
+
+
+class Controller(Protocol):
+    """Turns estimates and references into commands; knows no clock but the times in its arguments.
+
+    Attributes:
+        ahead: Instants after the step at which it wants the reference (n,) [s].
+    """
+
+    ahead: Array
+
+    def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
+        """Command for the coming period, within speed and stroke limits, and how it was found."""
+        ...
+
+
+def build_controller(settings: ControllerSettings, robot: Robot) -> Controller:
+    """Build the controller of a ``controller:`` section."""
+    if settings.prediction == "literal":
+        return LiteralIoc(settings, robot)
+    return InstantaneousOptimalControl(settings, robot)

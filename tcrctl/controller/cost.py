@@ -1,0 +1,52 @@
+"""From settings to the arrays of the quadratic problem: weights, targets and input limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcrctl.controller.ioc import Weights
+from tcrctl.controller.settings import IocSettings
+from tcrctl.robot.response import POSE_ROWS
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array, Reference
+
+
+def make_weights(settings: IocSettings, m: int) -> Weights:
+    """Weights of (30) for ``m`` cables; position-only tracking has no weight on normal and twist."""
+    w, tension = settings.weights, settings.tension
+    output = np.zeros(POSE_ROWS + m)
+    output[:3] = w.position
+    if settings.output == "pose":
+        output[3:6], output[6] = w.normal, w.twist
+    if tension is None:
+        return Weights(output, w.speed, w.speed_change, -np.inf, np.inf, 1.0)
+    output[POSE_ROWS:] = tension.weight
+    return Weights(output, w.speed, w.speed_change, tension.floor_n, tension.ceiling_n, tension.softness)
+
+
+def make_target(settings: IocSettings, reference: Reference, shift: Array, m: int) -> Array:
+    """Outputs wanted at the prediction instants (n, 7 + m), shifted by the integral action (6,)."""
+    n = reference.ahead_position.shape[0]
+    target = np.zeros((n, POSE_ROWS + m))
+    target[:, :3] = reference.ahead_position + shift[:3]
+    if reference.ahead_normal is not None:
+        target[:, 3:6] = reference.ahead_normal + shift[3:]
+    if settings.tension is not None:
+        target[:, POSE_ROWS:] = settings.tension.reference_n
+    return target
+
+
+def input_limits(settings: IocSettings, robot: Robot, drive: Array, blocks: int) -> tuple[Array, Array]:
+    """Hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
+    limit = settings.speed_limit_mm_s / 1000.0
+    low, high = np.full(blocks * drive.shape[0], -limit), np.full(blocks * drive.shape[0], limit)
+    m = drive.shape[0]
+    low[:m] = np.clip((robot.stroke[0] - drive) / settings.period_s, -limit, limit)
+    high[:m] = np.clip((robot.stroke[1] - drive) / settings.period_s, -limit, limit)
+    return low, high
+
+
+def pose_error(reference: Reference, position: Array, normal: Array) -> Array:
+    """Wanted minus measured end pose (6,): position [m], normal (0 where it is not tracked)."""
+    turned = np.zeros(3) if reference.normal is None else reference.normal - normal
+    return np.concatenate([reference.position - position, turned])

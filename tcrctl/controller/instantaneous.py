@@ -1,0 +1,92 @@
+"""Instantaneous optimal controller: predict, build (30), solve the LCP, check, command.
+
+    reference, estimate -> integral shift -> target --+
+    estimate -> predictor -> affine prediction -------+-> build_ioc -> solve_ioc -> first block -> command
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcrctl.controller.cost import input_limits, make_target, make_weights, pose_error
+from tcrctl.controller.integral import IntegralAction
+from tcrctl.controller.ioc import Solution, build_ioc, solve_ioc
+from tcrctl.controller.multi_step import MultiStep, outputs
+from tcrctl.controller.one_step import OneStep
+from tcrctl.controller.predictor import Forecast, Predictor
+from tcrctl.controller.settings import IocSettings
+from tcrctl.robot.response import POSE_ROWS
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
+
+#: Choice of prediction by name.
+PREDICTORS: dict[str, type[MultiStep] | type[OneStep]] = {"multi_step": MultiStep, "one_step": OneStep}
+
+#: Largest violation of the LCP conditions accepted; their rows are speeds [m/s] and tensions [N].
+LCP_TOLERANCE = 1e-6
+
+
+class InstantaneousOptimalControl:
+    """See the module's docstring.
+
+    Attributes:
+        ahead: Prediction instants after the step (n,) [s].
+    """
+
+    def __init__(self, settings: IocSettings, robot: Robot) -> None:
+        self._settings, self._robot = settings, robot
+        self._predictor: Predictor = PREDICTORS[settings.prediction](settings, robot)
+        self._weights = make_weights(settings, robot.n_cables)
+        self._integral = IntegralAction(settings.integral, settings.period_s)
+        self._speed = np.zeros(robot.n_cables)
+        self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
+        self.ahead = self._predictor.ahead
+
+    def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
+        """Command for the coming period; the drives are held if no trustworthy one was found."""
+        age = reference.t - estimate.t
+        now = outputs(estimate, age, self._robot)
+        error = pose_error(reference, now[:3], now[3:6])
+        shift = self._integral.update(error, bool(self._saturated.any()))
+        forecast = self._predictor.predict(estimate, age, self._speed)
+        target = make_target(self._settings, reference, shift, self._robot.n_cables)
+        low, high = input_limits(self._settings, self._robot, estimate.drive, self._predictor.blocks)
+        problem = build_ioc(forecast.prediction, target, self._speed, low, high, self._weights)
+        solution = Solution(*solve_ioc(problem, forecast.prediction, self._weights))
+        reason = _doubt(estimate, forecast, solution)
+        m = self._robot.n_cables
+        self._speed = np.zeros(m) if reason else np.clip(solution.inputs[:m], low[:m], high[:m])
+        limit = self._settings.speed_limit_mm_s / 1000.0
+        self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
+        info = ControlInfo(
+            converged=not reason,
+            iterations=forecast.iterations,
+            residual=forecast.residual,
+            lcp_residual=solution.residual,
+            lcp_pivots=solution.pivots,
+            saturated=self._saturated,
+            predicted_tension=_last_tension(forecast, solution),
+            integral=shift,
+            reason=reason,
+        )
+        return Command(self._speed, estimate.drive + self._settings.period_s * self._speed), info
+
+
+def _doubt(estimate: Estimate, forecast: Forecast, solution: Solution) -> str:
+    """Empty, or why the command of this step cannot be trusted."""
+    if not estimate.converged:
+        return "the estimator's step did not converge"
+    if not forecast.converged:
+        return forecast.reason
+    if not solution.solved or not solution.residual <= LCP_TOLERANCE:
+        return f"the complementarity problem was not solved (residual {solution.residual:.2g})"
+    if not np.all(np.isfinite(solution.inputs)):
+        return "the inputs are not finite"
+    return ""
+
+
+def _last_tension(forecast: Forecast, solution: Solution) -> Array:
+    """Predicted tensions at the end of the horizon (m,) [N]."""
+    free, gain = forecast.prediction
+    predicted: Array = free[-1, POSE_ROWS:] + gain[-1, POSE_ROWS:] @ solution.inputs
+    return predicted

@@ -1,0 +1,35 @@
+"""Integral action: the target is shifted by the integrated end pose error, so that no error lasts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tcrctl.controller.settings import IntegralSettings
+from tcrctl.signals import Array
+
+
+class IntegralAction:
+    """Shift of the target position (3) [m] and normal (3), bounded, and frozen while inputs are saturated.
+
+    Attributes:
+        shift: The present shift (6,): position [m], normal.
+    """
+
+    def __init__(self, settings: IntegralSettings | None, period: float) -> None:
+        self.shift = np.zeros(6)
+        self._rate = 0.0 if settings is None else settings.gain_1_s * period
+        mm, deg = (0.0, 0.0) if settings is None else (settings.limit_mm, settings.limit_deg)
+        self._limit = np.repeat([mm / 1000.0, math.radians(deg)], 3)
+
+    def update(self, error: Array, saturated: bool) -> Array:
+        """Add one period of ``error`` (6,) = wanted - measured; returns the shift.
+
+        Saturated inputs cannot act on more shift (anti-windup), so it does not grow then.
+        """
+        wanted = np.clip(self.shift + self._rate * error, -self._limit, self._limit)
+        if saturated:
+            wanted = np.where(np.abs(wanted) < np.abs(self.shift), wanted, self.shift)
+        self.shift = wanted
+        return wanted

@@ -1,0 +1,222 @@
+"""Instantaneous optimal control: the quadratic problem (30)-(32) and its solution as an LCP (33)-(40).
+
+The prediction is affine in the inputs U (all blocks of all drives): Y = Y_0 + S U, in the place of (31). Then
+
+    J/2 = 1/2 Σ_n |Y_n - Y_d,n|²_Q + 1/2 Σ_b (|u_b|²_R + |u_b - u_{b-1}|²_W) = 1/2 U'H U + g'U + const
+
+with rows A U >= b: hard ones for the speed and stroke limits, soft ones (quadratic slack with compliance D) for
+the tension floor and ceiling. The KKT conditions are the LCP
+
+    w = (A H^-1 A' + D) κ - A H^-1 g - b,    w >= 0, κ >= 0, w'κ = 0,      U = H^-1 (A'κ - g)
+
+which for one block and box rows only is (39)-(40) with M = -T, q = -φ (REFERENCES.md, correction 4).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from tcrctl.numerics.lcp import SOLVED, lcp_residuals, solve_lcp
+from tcrctl.robot.response import POSE_ROWS
+from tcrctl.signals import Array
+
+#: Rounds in which violated tension rows are added to the LCP.
+MAX_ROUNDS = 6
+#: A tension row counts as violated beyond this [N].
+TENSION_SLACK = 1e-3
+
+
+class Weights(NamedTuple):
+    """Weights of the cost (30) and limits of the tension rows.
+
+    Attributes:
+        output: Q for position (3) [1/m2], normal (3), twist (1) [1/rad2], tensions (m) [1/N2] (7 + m,).
+        speed: R [s2/m2].
+        speed_change: W [s2/m2].
+        floor: Lowest tension wanted [N]; -inf for none.
+        ceiling: Highest tension wanted [N]; inf for none.
+        softness: Compliance of the tension rows [N2].
+    """
+
+    output: Array
+    speed: float
+    speed_change: float
+    floor: float
+    ceiling: float
+    softness: float
+
+
+class Prediction(NamedTuple):
+    """Affine prediction Y = free + gain U.
+
+    Attributes:
+        free: Outputs at the prediction instants for U = 0 (n, 7 + m).
+        gain: Their derivatives (n, 7 + m, blocks * m).
+    """
+
+    free: Array
+    gain: Array
+
+
+class Problem(NamedTuple):
+    """The quadratic problem: 1/2 U'H U + g'U, low <= U <= high, soft tension rows.
+
+    Attributes:
+        H: Hessian (U, U).
+        g: Gradient at U = 0 (U,).
+        low: Lower limits of the inputs (U,) [m/s].
+        high: Upper limits (U,) [m/s].
+    """
+
+    H: Array
+    g: Array
+    low: Array
+    high: Array
+
+
+class Solution(NamedTuple):
+    """Inputs with proof.
+
+    Attributes:
+        inputs: U (blocks * m,) [m/s].
+        residual: Largest violation of the LCP's conditions.
+        pivots: Pivots of Lemke's algorithm, all rounds.
+        solved: The LCP was solved and no tension row outside it is violated.
+        rows: Rows of the last LCP.
+    """
+
+    inputs: Array
+    residual: float
+    pivots: int
+    solved: bool
+    rows: int
+
+
+@njit(cache=True, error_model="numpy")
+def build_ioc(
+    prediction: Prediction, target: Array, previous: Array, low: Array, high: Array, weights: Weights
+) -> Problem:
+    """Assemble (32) for an affine prediction.
+
+    Args:
+        prediction: Predicted outputs.
+        target: Outputs wanted (n, 7 + m).
+        previous: Input of the last step u_k (m,) [m/s].
+        low: Lower limits of the inputs (blocks * m,) [m/s].
+        high: Upper limits (blocks * m,) [m/s].
+        weights: Weights of the cost.
+    """
+    gain = prediction.gain
+    n, rows, size, m = gain.shape[0], gain.shape[1], gain.shape[2], previous.shape[0]
+    H, g = np.zeros((size, size)), np.zeros(size)
+    for i in range(n):
+        for r in range(rows):
+            q = weights.output[r]
+            if q != 0.0:
+                error = q * (prediction.free[i, r] - target[i, r])
+                for a in range(size):
+                    s = gain[i, r, a]
+                    g[a] += error * s
+                    s *= q
+                    for b in range(a, size):
+                        H[a, b] += s * gain[i, r, b]
+    for a in range(size):
+        H[a, a] += weights.speed + weights.speed_change
+        if a < m:
+            g[a] -= weights.speed_change * previous[a]
+        else:
+            H[a - m, a - m] += weights.speed_change
+            H[a - m, a] -= weights.speed_change
+        for b in range(a):
+            H[a, b] = H[b, a]
+    for a in range(size):
+        for b in range(a):
+            H[a, b] = H[b, a]
+    return Problem(H, g, low, high)
+
+
+@njit(cache=True, error_model="numpy")
+def _violated(prediction: Prediction, weights: Weights, U: Array, m: int, chosen: Array) -> int:
+    """Mark newly violated tension rows in ``chosen`` (n, m): +1 floor, -1 ceiling; returns how many are new."""
+    new = 0
+    for i in range(prediction.free.shape[0]):
+        for c in range(m):
+            row = POSE_ROWS + c
+            tension = prediction.free[i, row]
+            for a in range(U.shape[0]):
+                tension += prediction.gain[i, row, a] * U[a]
+            side = 0.0
+            if tension < weights.floor - TENSION_SLACK:
+                side = 1.0
+            elif tension > weights.ceiling + TENSION_SLACK:
+                side = -1.0
+            if side != 0.0 and chosen[i, c] == 0.0:
+                chosen[i, c] = side
+                new += 1
+    return new
+
+
+@njit(cache=True, error_model="numpy")
+def _rows(
+    problem: Problem, prediction: Prediction, weights: Weights, chosen: Array
+) -> tuple[Array, Array, Array]:
+    """A (rows, U), b (rows,), D (rows,): box rows first, then the chosen tension rows."""
+    size, m = problem.g.shape[0], chosen.shape[1]
+    extra = 0
+    for i in range(chosen.shape[0]):
+        for c in range(m):
+            if chosen[i, c] != 0.0:
+                extra += 1
+    A, b, D = np.zeros((2 * size + extra, size)), np.zeros(2 * size + extra), np.zeros(2 * size + extra)
+    for a in range(size):
+        A[a, a], b[a] = -1.0, -problem.high[a]
+        A[size + a, a], b[size + a] = 1.0, problem.low[a]
+    k = 2 * size
+    for i in range(chosen.shape[0]):
+        for c in range(m):
+            side = chosen[i, c]
+            if side != 0.0:
+                limit = weights.floor if side > 0.0 else weights.ceiling
+                for a in range(size):
+                    A[k, a] = side * prediction.gain[i, POSE_ROWS + c, a]
+                b[k] = side * (limit - prediction.free[i, POSE_ROWS + c])
+                D[k] = weights.softness
+                k += 1
+    return A, b, D
+
+
+@njit(cache=True, error_model="numpy")
+def solve_ioc(problem: Problem, prediction: Prediction, weights: Weights) -> Solution:
+    """Solve the problem by Lemke's algorithm, adding tension rows until none outside the LCP is violated.
+
+    Args:
+        problem: From :func:`build_ioc`.
+        prediction: The prediction it was built of.
+        weights: Limits of the tension rows.
+    """
+    m = prediction.free.shape[1] - POSE_ROWS
+    chosen = np.zeros((prediction.free.shape[0], m))
+    inverse = np.linalg.inv(problem.H)
+    U = np.zeros(problem.g.shape[0])
+    pivots, residual, rows = 0, np.inf, 0
+    for _ in range(MAX_ROUNDS):
+        A, b, D = _rows(problem, prediction, weights, chosen)
+        rows = b.shape[0]
+        AH = np.dot(A, inverse)
+        M = np.dot(AH, A.T)
+        for k in range(rows):
+            M[k, k] += D[k]
+        q = -np.dot(AH, problem.g) - b
+        kappa, _, used, status = solve_lcp(M, q)
+        pivots += used
+        if status != SOLVED:
+            return Solution(U, residual, pivots, False, rows)
+        U = np.dot(inverse, np.dot(kappa, A) - problem.g)
+        w_low, z_low, product = lcp_residuals(M, q, kappa)
+        residual = max(w_low, z_low, product)
+        if _violated(prediction, weights, U, m, chosen) == 0:
+            return Solution(U, residual, pivots, True, rows)
+    return Solution(U, residual, pivots, False, rows)

@@ -1,0 +1,44 @@
+"""What the controller needs of a prediction of the end pose and the tensions over its horizon."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from tcrctl.controller.ioc import Prediction
+from tcrctl.signals import Array, Estimate
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """A prediction with proof.
+
+    Attributes:
+        prediction: Affine in the inputs of all blocks.
+        converged: The prediction can be trusted.
+        iterations: Newton iterations.
+        residual: Largest nodal force left [N].
+        reason: Empty, or why it cannot be trusted.
+    """
+
+    prediction: Prediction
+    converged: bool
+    iterations: int
+    residual: float
+    reason: str = ""
+
+
+class Predictor(Protocol):
+    """One way to predict.
+
+    Attributes:
+        ahead: Prediction instants after the step (n,) [s].
+        blocks: Number of input blocks.
+    """
+
+    ahead: Array
+    blocks: int
+
+    def predict(self, estimate: Estimate, age: float, speed: Array) -> Forecast:
+        """Predict from an estimate that is ``age`` [s] old, with ``speed`` (m,) [m/s] the last input."""
+        ...

@@ -1,0 +1,41 @@
+"""What the loop needs of a state estimator, and which kinds there are."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from tcrctl.errors import InputError
+from tcrctl.estimator.exact import ExactState, State
+from tcrctl.estimator.passive_observer import PassiveObserver
+from tcrctl.estimator.settings import EstimatorSettings, ExactSettings
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Command, Estimate, Measurement
+
+
+class Estimator(Protocol):
+    """Turns measurements into states of the robot model."""
+
+    def update(self, measured: Measurement, applied: Command) -> Estimate:
+        """State at the time of ``measured``, ``applied`` being the command since the last update."""
+        ...
+
+
+def build_estimator(
+    settings: EstimatorSettings, robot: Robot, period: float, state: State | None
+) -> Estimator:
+    """Build the estimator of an ``estimator:`` section.
+
+    Args:
+        settings: The section.
+        robot: The robot that the controller knows.
+        period: Control period [s].
+        state: True positions and velocities of a simulated plant, None on a rig.
+
+    Raises:
+        InputError: If the exact state is asked for where there is none.
+    """
+    if isinstance(settings, ExactSettings):
+        if state is None:
+            raise InputError("estimator.kind: exact needs a simulated plant")
+        return ExactState(robot, state)
+    return PassiveObserver(settings, robot, period)

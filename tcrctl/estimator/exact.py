@@ -1,0 +1,43 @@
+"""The simulated plant's true state, for studies of the controller alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tcrctl.elements import sliding_cable
+from tcrctl.robot import pose
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array, Command, Estimate, Measurement
+
+State = Callable[[], tuple[Array, Array]]
+
+
+class ExactState:
+    """Passes on what ``state`` returns: true positions and velocities (3 n_nodes,) each."""
+
+    def __init__(self, robot: Robot, state: State) -> None:
+        self._robot, self._state = robot, state
+
+    def update(self, measured: Measurement, applied: Command) -> Estimate:
+        """Estimate without error; tensions are those of the controller's model in that shape."""
+        del applied
+        q, v = self._state()
+        model, tip = self._robot.model, self._robot.tip
+        length, gradient = np.zeros(self._robot.n_cables), np.zeros((self._robot.n_cables, q.shape[0]))
+        sliding_cable.path_gradients(
+            q, model.first_hole, model.hole_nodes, model.hole_weights, model.cables, length, gradient
+        )
+        stretch = length + measured.drive - model.cables[:, sliding_cable.REST]
+        return Estimate(
+            t=measured.t,
+            q=q,
+            v=v,
+            drive=measured.drive.copy(),
+            tension=np.maximum(model.cables[:, sliding_cable.STIFFNESS] * stretch, 0.0),
+            position=pose.position(q, tip),
+            normal=pose.normal(q, tip),
+            disturbance=np.zeros_like(q),
+            converged=True,
+        )

@@ -1,0 +1,27 @@
+"""What the loop needs of a plant, simulated, recorded or real."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from tcrctl.signals import Command, Measurement, Truth
+
+
+class Plant(Protocol):
+    """A robot that can be measured and driven."""
+
+    def read(self) -> Measurement:
+        """The newest measurement."""
+        ...
+
+    def write(self, command: Command) -> Command:
+        """Send a command for one control period; returns what was really sent, after the plant's limits."""
+        ...
+
+    def truth(self) -> Truth | None:
+        """What a simulated plant knows about itself at the time of the last ``read``; None on a rig."""
+        ...
+
+    def close(self) -> None:
+        """Leave the robot in a safe state."""
+        ...
