@@ -205,18 +205,19 @@ def solve_ioc(problem: Problem, prediction: Prediction, weights: Weights) -> Sol
     for _ in range(MAX_ROUNDS):
         A, b, D = _rows(problem, prediction, weights, chosen)
         rows = b.shape[0]
-        AH = np.dot(A, inverse)
-        M = np.dot(AH, A.T)
-        for k in range(rows):
-            M[k, k] += D[k]
-        q = -np.dot(AH, problem.g) - b
-        kappa, _, used, status = solve_lcp(M, q)
-        pivots += used
-        if status != SOLVED:
-            return Solution(U, residual, pivots, False, rows)
+        q = -np.dot(A, np.dot(inverse, problem.g)) - b
+        kappa, residual = np.zeros(rows), 0.0
+        if not np.min(q) >= 0.0:  # otherwise κ = 0 solves the LCP and no input stands at a limit
+            M = np.dot(np.dot(A, inverse), A.T)
+            for k in range(rows):
+                M[k, k] += D[k]
+            kappa, _, used, status = solve_lcp(M, q)
+            pivots += used
+            w_low, z_low, product = lcp_residuals(M, q, kappa)
+            residual = max(w_low, z_low, product)
+            if status != SOLVED:
+                return Solution(U, residual, pivots, False, rows)
         U = np.dot(inverse, np.dot(kappa, A) - problem.g)
-        w_low, z_low, product = lcp_residuals(M, q, kappa)
-        residual = max(w_low, z_low, product)
         if _violated(prediction, weights, U, m, chosen) == 0:
             return Solution(U, residual, pivots, True, rows)
     return Solution(U, residual, pivots, False, rows)

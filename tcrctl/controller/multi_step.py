@@ -97,17 +97,21 @@ class MultiStep:
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
         self._equilibrium = robot.rest.q.copy()
         self._offset, self._v = np.zeros_like(robot.rest.q), np.zeros_like(robot.rest.q)
+        self._drive, self._gain = np.zeros(robot.n_cables), robot.rest.gain.copy()
+        self._follow(self._drive)
+        self._basis = response.start_basis(robot.model, self._work, settings.modes)
 
-    def _follow(self, estimate: Estimate) -> Outcome:
-        """Move the model's equilibrium to the present drives."""
+    def _follow(self, drive: Array) -> Outcome:
+        """Move the model's equilibrium to ``drive``, starting where its static gain points to."""
         q = self._equilibrium.copy()
+        q[3 * FIXED :] += self._gain @ (drive - self._drive)
         outcome = Outcome(
-            *minimise(
-                self._robot.model, q, estimate.drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True
-            )
+            *minimise(self._robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         )
         if outcome.converged:
-            self._equilibrium = q
+            self._equilibrium, self._drive = q, drive.copy()
+            linear.couple(self._work, self._work.r)
+            linear.drive_gain(self._work, self._gain)
         return outcome
 
     def _update_offset(self, deviation: Array, v: Array) -> None:
@@ -121,17 +125,17 @@ class MultiStep:
     def predict(self, estimate: Estimate, age: float, speed: Array) -> Forecast:
         """See :class:`Predictor`."""
         del speed  # the prediction is linear: it does not depend on the last input
-        outcome = self._follow(estimate)
+        outcome = self._follow(estimate.drive)
         deviation = estimate.q + age * estimate.v - self._equilibrium
         if outcome.converged and self._blend:
             self._update_offset(deviation, estimate.v)
         self._v = estimate.v
-        change, shift = response.respond(
+        change, stable = response.respond(
             self._robot.model, self._equilibrium, deviation - self._offset, estimate.v, self._step,
-            self.ahead.shape[0], self._robot.tip, self._work,
+            self.ahead.shape[0], self._robot.tip, self._work, self._basis,
         )  # fmt: skip
         free, gain = superpose(change, outputs(estimate, age, self._robot), self._edges)
-        good = outcome.converged and shift == 0.0
+        good = outcome.converged and stable
         reason = "" if good else "the model has no stable equilibrium at the present drives"
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason)
 

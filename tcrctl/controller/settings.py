@@ -83,6 +83,9 @@ class IocSettings(Settings):
         le=12,
         description="piecewise constant inputs over the horizon; prediction: multi_step only",
     )
+    modes: int = Field(
+        default=12, ge=1, le=60, description="modes of the prediction; prediction: multi_step only"
+    )
     offset: OrOff[OffsetSettings] = Field(
         default=OffsetSettings(), description="offset of the equilibrium, or off; prediction: multi_step only"
     )

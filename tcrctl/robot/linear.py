@@ -102,6 +102,28 @@ def solve(ws: Workspace, b: Array, x: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def solve_many(ws: Workspace, X: Array) -> None:
+    """Overwrite columns X (12 n_modules, r) by A^-1 X; ``columns`` and ``small`` as :func:`couple` left them."""
+    m, size, r = ws.axial.shape[0], X.shape[0], X.shape[1]
+    block_banded.solve(ws.U, X)
+    weight = np.zeros((m, r))
+    for c in range(m):
+        root = np.sqrt(ws.axial[c])
+        for k in range(size):
+            g = root * ws.G[c, 3 * FIXED + k]
+            if g != 0.0:
+                for j in range(r):
+                    weight[c, j] += g * X[k, j]
+    block_banded.solve_transposed(ws.small, weight)
+    block_banded.solve_upper(ws.small, weight)
+    for k in range(size):
+        for c in range(m):
+            y = ws.columns[k, c]
+            for j in range(r):
+                X[k, j] -= y * weight[c, j]
+
+
+@njit(cache=True, error_model="numpy")
 def drive_gain(ws: Workspace, gain: Array) -> None:
     """∂q/∂d = -A^-1 G' C at the configuration in ``ws``.
 
