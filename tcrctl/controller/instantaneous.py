@@ -1,10 +1,12 @@
 """Instantaneous optimal controller: predict, build (30), solve the LCP, check, command.
 
-    reference, estimate -> integral shift -> target --+
-    estimate -> predictor -> affine prediction -------+-> build_ioc -> solve_ioc -> first block -> command
+reference, estimate -> integral shift -> target --+
+estimate -> predictor -> affine prediction -------+-> build_ioc -> solve_ioc -> first block -> command
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -20,7 +22,10 @@ from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
 #: Choice of prediction by name.
-PREDICTORS: dict[str, type[MultiStep] | type[OneStep]] = {"multi_step": MultiStep, "one_step": OneStep}
+PREDICTORS: Mapping[str, Callable[[IocSettings, Robot], Predictor]] = {
+    "multi_step": MultiStep,
+    "one_step": OneStep,
+}
 
 #: Largest violation of the LCP conditions accepted; their rows are speeds [m/s] and tensions [N].
 LCP_TOLERANCE = 1e-6
@@ -35,7 +40,7 @@ class InstantaneousOptimalControl:
 
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
         self._settings, self._robot = settings, robot
-        self._predictor: Predictor = PREDICTORS[settings.prediction](settings, robot)
+        self._predictor = PREDICTORS[settings.prediction](settings, robot)
         self._weights = make_weights(settings, robot.n_cables)
         self._integral = IntegralAction(settings.integral, settings.period_s)
         self._speed = np.zeros(robot.n_cables)

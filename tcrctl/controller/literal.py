@@ -59,7 +59,7 @@ class LiteralIoc:
     def _linearise(self, q: Array, drive: Array, load: Load, speed: Array) -> tuple[Array, Prediction]:
         """Newton step (12 n_modules,) at the present input, and the outputs as (31)."""
         h, tip, ws = self._settings.period_s, self._robot.tip, self._work
-        assemble(self._robot.model, q, drive, load, ws, np.bool_(True))
+        assemble(self._robot.model, q, drive, load, ws, True)
         linear.factor_shifted(ws.K, ws.U)
         step = np.zeros(ws.r.shape[0])
         linear.solve(ws, -ws.r, step)
@@ -102,6 +102,8 @@ class LiteralIoc:
             saturated=np.abs(self._speed) >= (1.0 - 1e-9) * self._settings.speed_limit_mm_s / 1000.0,
             predicted_tension=self._work.tension.copy(),
             integral=self._integral.shift,
-            reason="" if good else f"(41) was not reached: |dz|/|z| = {change:.2g} after {iteration} iterations",
+            reason=""
+            if good
+            else f"(41) was not reached: |dz|/|z| = {change:.2g} after {iteration} iterations",
         )
         return Command(self._speed, estimate.drive + h * self._speed), info

@@ -27,7 +27,8 @@ class OneStep:
 
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
         self._robot, self._horizon = robot, settings.horizon_s
-        self.ahead, self.blocks = np.array([settings.horizon_s]), 1
+        self.ahead: Array = np.array([settings.horizon_s])
+        self.blocks = 1
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._gain = np.zeros((self._work.r.shape[0], robot.n_cables))
         self._column = np.zeros(self._work.r.shape[0])

@@ -75,11 +75,7 @@ class PassiveObserver:
         load = self._load(measured)
         q = self._q.copy()
         model, drive = self._robot.model, measured.drive
-        outcome = Outcome(
-            *minimise(
-                model, q, drive, load, self._work, TOLERANCE, np.int64(MAX_ITERATIONS), np.bool_(False)
-            )
-        )
+        outcome = Outcome(*minimise(model, q, drive, load, self._work, TOLERANCE, MAX_ITERATIONS, False))
         if outcome.converged:
             self._v, self._q, self._drive = (q - self._q) / self._period, q, drive.copy()
         position, normal = self._correct(measured)

@@ -132,20 +132,28 @@ def solve(U: Array, X: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def multiply(A: Array, x: Array) -> Array:
-    """Product of an unfactored block-banded matrix (n, w + 1, b, b) with a vector (n b,)."""
-    n, bands, b = A.shape[0], A.shape[1], A.shape[2]
-    y = np.zeros(n * b)
-    for j in range(n):
-        for d in range(min(bands, n - j)):
-            for r in range(b):
-                first = r if d == 0 else 0
-                for c in range(first, b):
-                    value = A[j, d, r, c]
-                    y[j * b + r] += value * x[(j + d) * b + c]
-                    if d > 0 or c > r:
-                        y[(j + d) * b + c] += value * x[j * b + r]
-    return y
+def _add_block_products(block: Array, diagonal: bool, i: int, j: int, X: Array, out: Array) -> None:
+    """Add the products of ``block`` at (i, j) and, off the diagonal, of its transpose at (j, i)."""
+    b = block.shape[0]
+    for r in range(b):
+        for c in range(r if diagonal else 0, b):
+            value = block[r, c]
+            if value != 0.0:
+                row, column = i * b + r, j * b + c
+                for k in range(X.shape[1]):
+                    out[row, k] += value * X[column, k]
+                if row != column:
+                    for k in range(X.shape[1]):
+                        out[column, k] += value * X[row, k]
+
+
+@njit(cache=True, error_model="numpy")
+def multiply_columns(A: Array, X: Array, out: Array) -> None:
+    """out = A X for an unfactored block-banded matrix A (n, w + 1, b, b) and columns X (n b, r)."""
+    out[:] = 0.0
+    for j in range(A.shape[0]):
+        for d in range(min(A.shape[1], A.shape[0] - j)):
+            _add_block_products(A[j, d], d == 0, j, j + d, X, out)
 
 
 @njit(cache=True, error_model="numpy")
@@ -153,9 +161,5 @@ def to_dense(A: Array) -> Array:
     """Dense symmetric matrix (n b, n b) of a block-banded one; for tests and small offline work."""
     size = A.shape[0] * A.shape[2]
     dense = np.empty((size, size))
-    unit = np.zeros(size)
-    for i in range(size):
-        unit[i] = 1.0
-        dense[:, i] = multiply(A, unit)
-        unit[i] = 0.0
+    multiply_columns(A, np.eye(size), dense)
     return dense

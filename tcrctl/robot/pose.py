@@ -1,4 +1,4 @@
-"""End pose of a configuration: centroid and unit normal of a ring, and their derivatives. (11)"""
+"""End pose of a configuration, (11): centroid and unit normal of a ring, and their derivatives."""
 
 from __future__ import annotations
 

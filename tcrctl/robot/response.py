@@ -101,20 +101,8 @@ def refine_basis(model: Model, ws: Workspace, V: Array) -> None:
 def _project(ws: Workspace, V: Array, GV: Array) -> Array:
     """Reduced stiffness V'AV (r, r); fills GV = G V (m, r)."""
     size, r = V.shape
-    n, bands, b = ws.K.shape[0], ws.K.shape[1], ws.K.shape[2]
-    KV = np.zeros((size, r))
-    for j in range(n):
-        for d in range(min(bands, n - j)):
-            for x in range(b):
-                for y in range(x if d == 0 else 0, b):
-                    value = ws.K[j, d, x, y]
-                    if value != 0.0:
-                        row, column = j * b + x, (j + d) * b + y
-                        for c in range(r):
-                            KV[row, c] += value * V[column, c]
-                        if row != column:
-                            for c in range(r):
-                                KV[column, c] += value * V[row, c]
+    KV = np.empty((size, r))
+    block_banded.multiply_columns(ws.K, V, KV)
     reduced = np.zeros((r, r))
     for k in range(size):
         for i in range(r):
@@ -159,7 +147,15 @@ def _observe(CV: Array, GV: Array, axial: Array, t: float, x: Array, out: Array)
 
 @njit(cache=True, error_model="numpy")
 def respond(
-    model: Model, q_eq: Array, offset: Array, v: Array, step: float, steps: int, tip: int, ws: Workspace, V: Array
+    model: Model,
+    q_eq: Array,
+    offset: Array,
+    v: Array,
+    step: float,
+    steps: int,
+    tip: int,
+    ws: Workspace,
+    V: Array,
 ) -> tuple[Array, bool]:
     """Changes of end pose and tensions at the times step, 2 step, ... after a state.
 
