@@ -139,22 +139,17 @@ def build_ioc(
 
 
 @njit(cache=True, error_model="numpy")
-def _violated(prediction: Prediction, weights: Weights, U: Array, m: int, chosen: Array) -> int:
-    """Mark newly violated tension rows in ``chosen`` (n, m): +1 floor, -1 ceiling; returns how many are new."""
-    new = 0
+def _violated(prediction: Prediction, weights: Weights, U: Array, chosen: Array) -> int:
+    """Mark newly violated tension rows in ``chosen`` (n, 2 m), floors then ceilings; returns how many are new."""
+    new, m = 0, chosen.shape[1] // 2
     for i in range(prediction.free.shape[0]):
         for c in range(m):
-            row = POSE_ROWS + c
-            tension = prediction.free[i, row]
-            for a in range(U.shape[0]):
-                tension += prediction.gain[i, row, a] * U[a]
-            side = 0.0
-            if tension < weights.floor - TENSION_SLACK:
-                side = 1.0
-            elif tension > weights.ceiling + TENSION_SLACK:
-                side = -1.0
-            if side != 0.0 and chosen[i, c] == 0.0:
-                chosen[i, c] = side
+            tension = prediction.free[i, POSE_ROWS + c] + np.dot(prediction.gain[i, POSE_ROWS + c], U)
+            if tension < weights.floor - TENSION_SLACK and not chosen[i, c]:
+                chosen[i, c] = True
+                new += 1
+            if tension > weights.ceiling + TENSION_SLACK and not chosen[i, m + c]:
+                chosen[i, m + c] = True
                 new += 1
     return new
 
@@ -164,25 +159,21 @@ def _rows(
     problem: Problem, prediction: Prediction, weights: Weights, chosen: Array
 ) -> tuple[Array, Array, Array]:
     """A (rows, U), b (rows,), D (rows,): box rows first, then the chosen tension rows."""
-    size, m = problem.g.shape[0], chosen.shape[1]
-    extra = 0
-    for i in range(chosen.shape[0]):
-        for c in range(m):
-            if chosen[i, c] != 0.0:
-                extra += 1
-    A, b, D = np.zeros((2 * size + extra, size)), np.zeros(2 * size + extra), np.zeros(2 * size + extra)
+    size, m = problem.g.shape[0], chosen.shape[1] // 2
+    total = 2 * size + np.sum(chosen)
+    A, b, D = np.zeros((total, size)), np.zeros(total), np.zeros(total)
     for a in range(size):
         A[a, a], b[a] = -1.0, -problem.high[a]
         A[size + a, a], b[size + a] = 1.0, problem.low[a]
     k = 2 * size
     for i in range(chosen.shape[0]):
-        for c in range(m):
-            side = chosen[i, c]
-            if side != 0.0:
-                limit = weights.floor if side > 0.0 else weights.ceiling
+        for c in range(2 * m):
+            if chosen[i, c]:
+                side, limit = (1.0, weights.floor) if c < m else (-1.0, weights.ceiling)
+                row = POSE_ROWS + c % m
                 for a in range(size):
-                    A[k, a] = side * prediction.gain[i, POSE_ROWS + c, a]
-                b[k] = side * (limit - prediction.free[i, POSE_ROWS + c])
+                    A[k, a] = side * prediction.gain[i, row, a]
+                b[k] = side * (limit - prediction.free[i, row])
                 D[k] = weights.softness
                 k += 1
     return A, b, D
@@ -198,7 +189,7 @@ def solve_ioc(problem: Problem, prediction: Prediction, weights: Weights) -> Sol
         weights: Limits of the tension rows.
     """
     m = prediction.free.shape[1] - POSE_ROWS
-    chosen = np.zeros((prediction.free.shape[0], m))
+    chosen = np.zeros((prediction.free.shape[0], 2 * m), dtype=np.bool_)
     inverse = np.linalg.inv(problem.H)
     U = np.zeros(problem.g.shape[0])
     pivots, residual, rows = 0, np.inf, 0
@@ -218,6 +209,6 @@ def solve_ioc(problem: Problem, prediction: Prediction, weights: Weights) -> Sol
             if status != SOLVED:
                 return Solution(U, residual, pivots, False, rows)
         U = np.dot(inverse, np.dot(kappa, A) - problem.g)
-        if _violated(prediction, weights, U, m, chosen) == 0:
+        if _violated(prediction, weights, U, chosen) == 0:
             return Solution(U, residual, pivots, True, rows)
     return Solution(U, residual, pivots, False, rows)

@@ -88,7 +88,7 @@ class MultiStep:
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
         self._robot = robot
         self._step = settings.horizon_s / settings.instants
-        self.ahead: Array = self._step * np.arange(1, settings.instants + 1)
+        self.ahead: Array = np.arange(1.0, settings.instants + 1.0) * self._step
         self.blocks = settings.blocks
         self._edges = block_edges(settings.instants, settings.blocks)
         self._period = settings.period_s
