@@ -30,6 +30,9 @@ PREDICTORS: Mapping[str, Callable[[IocSettings, Robot], Predictor]] = {
 #: Largest violation of the LCP conditions accepted; their rows are speeds [m/s] and tensions [N].
 LCP_TOLERANCE = 1e-6
 
+#: Stands for the solution of a problem that was not even built.
+NO_SOLUTION = Solution(np.zeros(0), np.inf, 0, False, 0)
+
 
 class InstantaneousOptimalControl:
     """See the module's docstring.
@@ -54,11 +57,15 @@ class InstantaneousOptimalControl:
         error = pose_error(reference, now[:3], now[3:6])
         shift = self._integral.update(error, bool(self._saturated.any()))
         forecast = self._predictor.predict(estimate, age, self._speed)
-        target = make_target(self._settings, reference, shift, self._robot.n_cables)
         low, high = input_limits(self._settings, self._robot, estimate.drive, self._predictor.blocks)
-        problem = build_ioc(forecast.prediction, target, self._speed, low, high, self._weights)
-        solution = Solution(*solve_ioc(problem, forecast.prediction, self._weights))
-        reason = _doubt(estimate, forecast, solution)
+        solution = NO_SOLUTION
+        reason = _doubt(estimate, forecast)
+        if not reason:
+            target = make_target(self._settings, reference, shift, self._robot.n_cables)
+            problem = build_ioc(forecast.prediction, target, self._speed, low, high, self._weights)
+            solution = Solution(*solve_ioc(problem, forecast.prediction, self._weights))
+            if not (solution.solved and solution.residual <= LCP_TOLERANCE):
+                reason = f"the complementarity problem was not solved (residual {solution.residual:.2g})"
         m = self._robot.n_cables
         self._speed = np.zeros(m) if reason else np.clip(solution.inputs[:m], low[:m], high[:m])
         limit = self._settings.speed_limit_mm_s / 1000.0
@@ -77,21 +84,21 @@ class InstantaneousOptimalControl:
         return Command(self._speed, estimate.drive + self._settings.period_s * self._speed), info
 
 
-def _doubt(estimate: Estimate, forecast: Forecast, solution: Solution) -> str:
-    """Empty, or why the command of this step cannot be trusted."""
+def _doubt(estimate: Estimate, forecast: Forecast) -> str:
+    """Empty, or why no command can be built on this step."""
     if not estimate.converged:
         return "the estimator's step did not converge"
     if not forecast.converged:
         return forecast.reason
-    if not solution.solved or not solution.residual <= LCP_TOLERANCE:
-        return f"the complementarity problem was not solved (residual {solution.residual:.2g})"
-    if not np.all(np.isfinite(solution.inputs)):
-        return "the inputs are not finite"
+    if not (np.isfinite(forecast.prediction.free).all() and np.isfinite(forecast.prediction.gain).all()):
+        return "the prediction is not finite"
     return ""
 
 
 def _last_tension(forecast: Forecast, solution: Solution) -> Array:
-    """Predicted tensions at the end of the horizon (m,) [N]."""
+    """Predicted tensions at the end of the horizon (m,) [N]; those without any input if there is none."""
     free, gain = forecast.prediction
+    if not solution.solved:
+        return free[-1, POSE_ROWS:].copy()
     predicted: Array = free[-1, POSE_ROWS:] + gain[-1, POSE_ROWS:] @ solution.inputs
     return predicted
