@@ -135,6 +135,24 @@ class StoppedError(TcrctlError):
         self.step = step
 
 
+class SafetyLimitError(StoppedError):
+    """A quantity left the range in which the run may go on; the drives were held.
+
+    Attributes:
+        quantity: Name of the quantity.
+        value: Its value.
+        limit: The limit.
+        unit: Unit of value and limit; empty for a count.
+    """
+
+    def __init__(self, step: int, quantity: str, value: float, limit: float, unit: str) -> None:
+        of = f" {unit}" if unit else ""
+        super().__init__(
+            f"safety stop at step {step}: {quantity} is {value:.4g}{of}, limit {limit:.4g}{of}", step
+        )
+        self.quantity, self.value, self.limit, self.unit = quantity, value, limit, unit
+
+
 class DivergenceError(StoppedError):
     """The simulated plant could not complete a time step.
 
@@ -150,6 +168,19 @@ class DivergenceError(StoppedError):
             f"with sub-steps down to {smallest_step:.2g} s"
         )
         self.time, self.residual, self.smallest_step = time, residual, smallest_step
+
+
+class RunInterruptedError(TcrctlError):
+    """A signal asked the run to stop, and it did so between two control steps.
+
+    Attributes:
+        signal: Number of the signal.
+        exit_code: 128 + number: 130 for Ctrl-C, 143 for SIGTERM.
+    """
+
+    def __init__(self, number: int, name: str) -> None:
+        super().__init__(f"stopped by {name}")
+        self.signal, self.exit_code = number, 128 + number
 
 
 class DeviceError(TcrctlError):

@@ -5,6 +5,7 @@ SPEC (name or path) -> strict YAML -> --set -> ExperimentSpec + RobotDescription
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from tcrctl.robot.description import RobotDescription
 from tcrctl.robot.sections import Name
 from tcrctl.settings import Path as Keys
 from tcrctl.settings import Settings, quantity, refuse
+from tcrctl.summary import TASK, UNITS
 from tcrctl.trajectory.settings import TrajectorySettings
 
 
@@ -30,6 +32,20 @@ class LogSettings(Settings):
     flush_s: float = quantity("s", "longest time between two flushes", 0.5, gt=0)
     flush_steps: int = Field(default=500, ge=1, description="most control steps between two flushes")
     fsync: bool = Field(default=False, description="wait until the disk has the data, against power failure")
+
+
+class SafetySettings(Settings):
+    """When a run is stopped, beside the robot's tension limit and two unsolved steps in a row."""
+
+    position_error_mm: float = quantity("mm", "largest distance between estimated and wanted end", 60.0, gt=0)
+
+
+class StartSettings(Settings):
+    """How the wanted pose gets from where the robot really is to the trajectory."""
+
+    blend_s: float = quantity(
+        "s", "time in which the offset of the start pose fades out; 0: begin with a step", 2.0, ge=0
+    )
 
 
 class ExperimentSpec(Settings):
@@ -49,6 +65,8 @@ class ExperimentSpec(Settings):
     criteria: tuple[CriterionText, ...] = Field(
         default=(), description="what the run must achieve, else exit code 3"
     )
+    safety: SafetySettings = SafetySettings()
+    start: StartSettings = StartSettings()
     log: LogSettings = LogSettings()
 
     @model_validator(mode="after")
@@ -58,6 +76,10 @@ class ExperimentSpec(Settings):
 
 
 def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+    for i, criterion in enumerate(spec.criteria):
+        if criterion.name not in UNITS and not criterion.name.startswith(TASK):
+            known = ", ".join(difflib.get_close_matches(criterion.name, UNITS, n=3, cutoff=0.3) or UNITS)
+            yield ("criteria", i), f"a run has no result {criterion.name}; known: {known}, {TASK}..."
     step, period = spec.plant.step_ms, spec.controller.period_s
     steps = period * 1e3 / step
     if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:

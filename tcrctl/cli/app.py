@@ -17,12 +17,14 @@ from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.recover import recover
+from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
 from tcrctl.cli.validate import validate
 from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
 VERBS: dict[str, Callable[..., None]] = {
+    "run": run,
     "list": list_shipped,
     "show": show,
     "validate": validate,

@@ -86,5 +86,9 @@ class SimulatedPlant:
             q=q.copy(),
         )
 
+    def state(self) -> tuple[Array, Array]:
+        """True node positions [m] and velocities [m/s] now, (3 n_nodes,) each."""
+        return self._state.q.copy(), self._state.v.copy()
+
     def close(self) -> None:
         """Nothing to leave safe in simulation."""

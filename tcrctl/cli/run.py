@@ -1,0 +1,192 @@
+"""``tcrctl run SPEC``: an experiment, from its file to a log."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tcrctl.cli.options import AsJson, Overrides, Spec
+
+if TYPE_CHECKING:
+    from tcrctl.experiment import Experiment, Notify
+    from tcrctl.feasibility import StaticPath
+    from tcrctl.spec import LoadedSpec
+    from tcrctl.summary import Summary
+
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Check everything, move nothing, write nothing.")]
+RealTime = Annotated[bool, typer.Option("--realtime", help="Pace a simulated plant by the clock.")]
+Out = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Where the run's folder is made.", show_default=True)
+]
+Seed = Annotated[int | None, typer.Option("--seed", metavar="N", min=0, help="Seed of everything random.")]
+Force = Annotated[bool, typer.Option("--force", help="Run even if the trajectory seems infeasible.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
+
+
+def run(
+    spec: Spec,
+    overrides: Overrides = None,
+    dry_run: DryRun = False,
+    realtime: RealTime = False,
+    out: Out = Path("logs"),
+    seed: Seed = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    r"""Run an experiment and record every control step.
+
+    The result goes to a new folder DIR/TIME_NAME_ID with log.mcap, spec.yaml, spec.resolved.yaml and
+    summary.json. Ctrl-C or SIGTERM stop a run safely between two steps; a second Ctrl-C stops it at once.
+
+    \b
+    Examples:
+      tcrctl run letter_t
+      tcrctl run letter_t --set plant.mismatch=off --seed 7
+      tcrctl run my_experiment.yaml --dry-run
+      tcrctl run letter_t --json --out /data/runs | jq .position_error_mm.max
+    """
+    from tcrctl.interruption import sigterm_exits
+    from tcrctl.spec import load_spec
+
+    say: Notify = _nothing if quiet else _say
+    with sigterm_exits():
+        loaded = load_spec(spec, overrides or ())
+        say(_headline(loaded))
+        if dry_run:
+            _dry_run(loaded, seed, force, say, as_json=as_json)
+        else:
+            _run(loaded, out, seed, force, realtime, say, as_json=as_json, quiet=quiet)
+
+
+def _dry_run(loaded: LoadedSpec, seed: int | None, force: bool, say: Notify, *, as_json: bool) -> None:
+    from tcrctl.experiment import prepare
+
+    experiment = prepare(loaded, seed=seed, notify=say)
+    path = _planned(experiment, force, say)
+    print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
+
+
+def _run(
+    loaded: LoadedSpec,
+    out: Path,
+    seed: int | None,
+    force: bool,
+    realtime: bool,
+    say: Notify,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    from tcrctl.run_folder import check_writable
+
+    check_writable(out)  # before the seconds that preparation takes
+    from tcrctl.experiment import prepare
+    from tcrctl.run import run_experiment
+
+    experiment = prepare(loaded, seed=seed, notify=say)
+    _planned(experiment, force, say)
+    with _progress_bar(loaded.spec.name, shown=not quiet) as progress:
+        summary = run_experiment(experiment, out=out, realtime=realtime, notify=say, progress=progress)
+    if summary.reason:
+        print(f"{'error' if summary.exit_code != 3 else summary.status}: {summary.reason}", file=sys.stderr)
+    if as_json:
+        print(json.dumps(summary.as_json()))
+    else:
+        _print_summary(summary)
+    if summary.exit_code:
+        raise typer.Exit(summary.exit_code)
+
+
+def _planned(experiment: Experiment, force: bool, say: Notify) -> StaticPath | None:
+    from tcrctl.errors import InfeasibleError
+    from tcrctl.experiment import plan
+
+    if force:
+        say("warning: --force: feasibility is not checked")
+        return None
+    try:
+        return plan(experiment)
+    except InfeasibleError as error:
+        error.hint = f"{error.hint} --force runs it all the same.".strip()
+        raise
+
+
+def _nothing(text: str) -> None:
+    del text
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _headline(loaded: LoadedSpec) -> str:
+    spec = loaded.spec
+    parts = f"robot {loaded.robot.name}, plant {spec.plant.kind}, controller {spec.controller.kind}"
+    return f"{spec.name}: {parts}, {1.0 / spec.controller.period_s:.4g} Hz"
+
+
+@contextmanager
+def _progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], None]]:
+    """A bar on stderr if that is a terminal; else nothing."""
+    if not (shown and sys.stderr.isatty()):
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(name, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _plan_json(experiment: Experiment, path: StaticPath | None) -> dict[str, Any]:
+    spec = experiment.spec
+    return {
+        "status": "success",
+        "reason": "",
+        "spec": spec.name,
+        "robot": experiment.robot.name,
+        "plant": spec.plant.kind,
+        "controller": spec.controller.kind,
+        "steps": experiment.steps,
+        "duration_s": experiment.steps * experiment.period,
+        "feasibility": None if path is None else path.as_json(),
+    }
+
+
+def _plan_text(experiment: Experiment, path: StaticPath | None) -> str:
+    lines = [f"{experiment.steps} steps, {experiment.steps * experiment.period:.2f} s"]
+    if path is not None:
+        found = path.as_json()
+        tension, drive = found["tension_n"], found["drive_mm"]
+        lines += [
+            f"feasible: drives {drive['min']:.1f} to {drive['max']:.1f} mm, at most "
+            f"{found['drive_speed_mm_s']['max']:.1f} mm/s",
+            f"          tensions {tension['min']:.1f} to {tension['max']:.1f} N (slow motion, nominal robot)",
+        ]
+    return "\n".join(lines)
+
+
+def _print_summary(summary: Summary) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from tcrctl.cli.run_table import rows
+
+    console = Console()
+    table = Table(show_header=False, box=None)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, text, style in rows(summary):
+        table.add_row(escape(name), escape(text), style=style)
+    console.print(table)
+    print(f"{summary.log}\nlook at it: tcrctl info {summary.log}")

@@ -1,0 +1,41 @@
+"""The result of a run as the rows of a table for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tcrctl.summary import Numbers, Summary
+
+Row = tuple[str, str, str]
+
+
+def rows(summary: Summary) -> Iterator[Row]:
+    """Yield name, text and style of every row."""
+    measures = summary.measures
+    yield "run", summary.run_id, ""
+    yield "status", summary.status, "green" if summary.exit_code == 0 else "red"
+    yield "steps", f"{measures.steps}, {measures.duration_s:.2f} s", ""
+    yield "position error", _numbers(measures.position_error_mm, "mm"), ""
+    if measures.orientation_error_deg is not None:
+        yield "orientation error", _numbers(measures.orientation_error_deg, "deg"), ""
+        yield "theta_x error", _numbers(measures.theta_x_error_rad, "rad"), ""
+        yield "theta_y error", _numbers(measures.theta_y_error_rad, "rad"), ""
+    yield "cable tension", _numbers(measures.tension_n, "N"), ""
+    if measures.saturated_fraction is not None:
+        yield "saturated", f"{100.0 * measures.saturated_fraction:.1f} % of the steps", ""
+    yield "control time", _numbers(measures.control_ms, "ms"), ""
+    yield "iterations", _numbers(measures.inner_iterations, ""), ""
+    if measures.overruns or measures.unconverged_steps:
+        text = f"{measures.overruns} overruns, {measures.unconverged_steps} unconverged steps"
+        yield "trouble", text, "yellow"
+    for verdict in summary.criteria:
+        result = "passed" if verdict.passed else "FAILED"
+        yield "criterion", f"{result}: {verdict}", "green" if verdict.passed else "red"
+
+
+def _numbers(numbers: Numbers, unit: str) -> str:
+    if numbers is None:
+        return "unknown"
+    return ", ".join(f"{name} {value:.4g} {unit}".rstrip() for name, value in numbers.items())

@@ -1,0 +1,203 @@
+"""An experiment file becomes a robot, a trajectory, a plant, an estimator and a controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from tcrctl.compilation import announced_compilation
+from tcrctl.controller.controller import Controller, build_controller
+from tcrctl.errors import InputError
+from tcrctl.estimator.estimator import Estimator, build_estimator
+from tcrctl.estimator.exact import State
+from tcrctl.feasibility import DriveLimits, StaticPath, check_feasibility
+from tcrctl.loop import run_loop, step_count
+from tcrctl.metrics import Metrics
+from tcrctl.pacing import Unpaced
+from tcrctl.plant.plant import Plant
+from tcrctl.plant.simulated import SimulatedPlant
+from tcrctl.robot import pose
+from tcrctl.robot.model import FIXED
+from tcrctl.robot.robot import Robot, build_robot
+from tcrctl.safety import SafetyLimits
+from tcrctl.signals import Array
+from tcrctl.spec import ExperimentSpec, LoadedSpec
+from tcrctl.trajectory.start_blend import StartBlend
+from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
+
+#: Measurements that are averaged to find where the robot is before it moves.
+START_READS: Final = 10
+#: Steps of the rehearsal that loads every kernel.
+WARM_UP_STEPS: Final = 3
+
+Notify = Callable[[str], None]
+PlantBuilder = Callable[["Experiment"], tuple[Plant, State | None]]
+
+
+def silent(text: str) -> None:
+    """Take a message for the user and drop it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """An experiment, built as far as it can be without a plant.
+
+    Attributes:
+        loaded: The files it came from.
+        spec: What they say, with the seed in use.
+        robot: The robot that the controller knows.
+        trajectory: What is wanted.
+    """
+
+    loaded: LoadedSpec
+    spec: ExperimentSpec
+    robot: Robot
+    trajectory: Trajectory
+
+    @property
+    def period(self) -> float:
+        """Control period [s]."""
+        return float(self.spec.controller.period_s)
+
+    @property
+    def steps(self) -> int:
+        """Control steps of a whole run."""
+        return step_count(self.trajectory.duration, self.period)
+
+    @property
+    def safety(self) -> SafetyLimits:
+        """When a run is stopped."""
+        return SafetyLimits(1e-3 * self.spec.safety.position_error_mm, self.robot.tension_limit)
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What one run is made of; every run needs new ones.
+
+    Attributes:
+        trajectory: What is wanted, beginning where the plant is.
+        plant: Is measured and driven.
+        estimator: Finds the state.
+        controller: Finds the command.
+        start_offset: Distance of the measured start from that of the trajectory [m]; NaN if the cameras do
+            not see the tip ring, so that it is not known.
+    """
+
+    trajectory: Trajectory
+    plant: Plant
+    estimator: Estimator
+    controller: Controller
+    start_offset: float
+
+
+def _simulated(experiment: Experiment) -> tuple[Plant, State]:
+    spec = experiment.spec
+    plant = SimulatedPlant(spec.plant, experiment.robot, experiment.period, spec.seed)
+    return plant, plant.state
+
+
+#: Plant, and its true state if it knows it, for every ``plant.kind``.
+PLANTS: Final[Mapping[str, PlantBuilder]] = {"simulated": _simulated}
+
+
+def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = silent) -> Experiment:
+    """Build robot and trajectory, and rehearse a few steps so that no kernel is compiled or loaded in a run.
+
+    Args:
+        loaded: The experiment.
+        seed: Seed of everything random; that of the experiment if None.
+        notify: Takes messages for the user.
+
+    Raises:
+        InputError: If robot, trajectory and controller do not go together.
+        NoEquilibriumError: If the robot has no stable shape.
+    """
+    changes: dict[str, Any] = {} if seed is None else {"seed": seed}
+    spec = loaded.spec.model_copy(update=changes)
+    with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
+        robot = build_robot(loaded.robot)
+        trajectory = build_trajectory(spec.trajectory, robot.rest_position, robot.rest_normal)
+        if spec.controller.output == "pose" and trajectory.normal(np.zeros(1)) is None:
+            raise InputError(
+                f"{loaded.path}: controller.output: pose needs a trajectory with an orientation; "
+                f"trajectory.kind: {spec.trajectory.kind} leaves it free"
+            )
+        experiment = Experiment(loaded, spec, robot, trajectory)
+        _rehearse(experiment)
+    return experiment
+
+
+def plan(experiment: Experiment) -> StaticPath:
+    """Find the drives along the trajectory, held against all limits.
+
+    Raises:
+        InfeasibleError: If the robot cannot follow.
+    """
+    robot, controller = experiment.robot, experiment.spec.controller
+    tension = controller.tension
+    limits = DriveLimits(
+        speed=controller.speed_limit_mm_s * 1e-3,
+        floor=0.0 if tension is None else tension.floor_n,
+        ceiling=robot.tension_limit if tension is None else tension.ceiling_n,
+        reference=float(np.mean(robot.rest.tension)) if tension is None else tension.reference_n,
+    )
+    return check_feasibility(experiment.trajectory, robot, limits)
+
+
+def build_parts(experiment: Experiment) -> Parts:
+    """Build plant, estimator and controller, and let the trajectory begin where the plant is.
+
+    Raises:
+        DeviceError: If the plant cannot be reached.
+    """
+    spec, robot, period = experiment.spec, experiment.robot, experiment.period
+    plant, state = PLANTS[spec.plant.kind](experiment)
+    trajectory, offset = experiment.trajectory, np.nan
+    found = measured_pose(plant, robot)
+    if found is not None:
+        offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))
+        trajectory = StartBlend(trajectory, *found, spec.start.blend_s)
+    return Parts(
+        trajectory,
+        plant,
+        build_estimator(spec.estimator, robot, period, state),
+        build_controller(spec.controller, robot),
+        offset,
+    )
+
+
+def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple[Array, Array] | None:
+    """End position (3,) [m] and normal (3,) as the cameras see them, averaged; None if they do not see them.
+
+    Args:
+        plant: At rest.
+        robot: Says which nodes are the tip ring.
+        reads: How many measurements are averaged.
+    """
+    tip = 3 * (robot.tip // FIXED - 1)  # rings are measured from the first free one on
+    seen = [plant.read() for _ in range(reads)]
+    rings = [m.nodes[tip : tip + 3].astype(float) for m in seen if m.valid[tip : tip + 3].all()]
+    if not rings:
+        return None
+    ring = np.mean(rings, axis=0).ravel()
+    return pose.position(ring, 0), pose.normal(ring, 0)
+
+
+def _rehearse(experiment: Experiment) -> None:
+    """Run a few steps with parts of its own, so that nothing of the run itself is touched."""
+    parts, metrics = build_parts(experiment), Metrics(WARM_UP_STEPS, paced=False)
+    run_loop(
+        parts.trajectory,
+        parts.estimator,
+        parts.controller,
+        parts.plant,
+        metrics.add,
+        period=experiment.period,
+        duration=WARM_UP_STEPS * experiment.period,
+        pace=Unpaced(),
+        limits=SafetyLimits(np.inf, np.inf, WARM_UP_STEPS + 1),
+    )
+    parts.plant.close()

@@ -1,0 +1,244 @@
+"""Whether the robot can follow a trajectory at all: quasi-static inverse along it, before anything moves.
+
+    trajectory -> end poses every 0.25 s -> drives and tensions that hold them -> limits
+
+At every sample Newton's method on the drives d brings the end to its place, the equilibrium being solved anew
+in each iteration. With J = ∂y/∂q ∂q/∂d (11) the step is the smallest one that removes the error; what it leaves
+free (robots with more cables than the pose has coordinates) is used to bring the tensions to their reference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from tcrctl.elements import sliding_cable
+from tcrctl.errors import InfeasibleError, NoEquilibriumError
+from tcrctl.robot import pose
+from tcrctl.robot.equilibrium import Equilibrium, equilibrium
+from tcrctl.robot.model import FIXED
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+from tcrctl.trajectory.trajectory import Trajectory
+
+#: Time between samples [s]; Newton starts from the sample before.
+INTERVAL: Final = 0.25
+#: Errors up to which a pose counts as reached [m], [1]; half a degree.
+REACHED: Final = np.array([1e-3] * 3 + [np.radians(0.5)] * 3)
+#: Newton ends when the error is this part of REACHED and the step would change no tension by more than EVEN [N].
+FINE: Final = 0.02
+EVEN: Final = 0.05
+MAX_ITERATIONS: Final = 40
+MAX_HALVINGS: Final = 6
+#: Longest step of a drive in one iteration [m].
+LONGEST_STEP: Final = 0.02
+#: Directions of the drives that move the end less than this part of the strongest one count as free.
+RANK: Final = 2e-3
+#: Weight of a cable below the tension floor against the others, in what is left free.
+SLACK_WEIGHT: Final = 30.0
+#: Free directions are damped by these weights against tensions in N: of drives [N/m] and of the normal [N].
+DRIVE_WEIGHT: Final = 50.0
+TURN_WEIGHT: Final = 50.0
+
+
+@dataclass(frozen=True, slots=True)
+class DriveLimits:
+    """What the drives and cables may do.
+
+    Attributes:
+        speed: Largest drive speed [m/s].
+        floor: Lowest tension [N].
+        ceiling: Highest tension [N].
+        reference: Tension that cables are drawn to where the pose leaves it open [N].
+    """
+
+    speed: float
+    floor: float
+    ceiling: float
+    reference: float
+
+
+@dataclass(frozen=True, slots=True)
+class StaticPath:
+    """How the robot follows a trajectory if it moves slowly.
+
+    Attributes:
+        time: Times of the samples (n,) [s].
+        drive: Drive lengths (n, m) [m].
+        tension: Cable tensions (n, m) [N].
+        error: What is left of the pose error, in units of REACHED, largest component (n,).
+    """
+
+    time: Array
+    drive: Array
+    tension: Array
+    error: Array
+
+    @property
+    def speed(self) -> Array:
+        """Mean drive speeds between the samples (n - 1, m) [m/s]."""
+        speed: Array = np.diff(self.drive, axis=0) / np.diff(self.time)[:, None]
+        return speed
+
+    def as_json(self) -> dict[str, dict[str, float]]:
+        """Extremes for ``run --dry-run --json``."""
+        return {
+            "drive_mm": {"min": 1e3 * float(self.drive.min()), "max": 1e3 * float(self.drive.max())},
+            "drive_speed_mm_s": {"max": 1e3 * float(np.abs(self.speed).max())},
+            "tension_n": {"min": float(self.tension.min()), "max": float(self.tension.max())},
+        }
+
+
+class Held(NamedTuple):
+    """Drives and the equilibrium that they hold."""
+
+    drive: Array
+    shape: Equilibrium
+
+
+def check_feasibility(trajectory: Trajectory, robot: Robot, limits: DriveLimits) -> StaticPath:
+    """Find the drives along a trajectory and hold them against all limits.
+
+    Args:
+        trajectory: What is wanted.
+        robot: The robot that the controller knows.
+        limits: What drives and cables may do; the stroke is the robot's.
+
+    Raises:
+        InfeasibleError: If something breaks a limit, with the first time at which it does.
+    """
+    count, m = 1 + max(1, int(np.ceil(trajectory.duration / INTERVAL))), robot.n_cables
+    times = np.linspace(0.0, trajectory.duration, count)
+    position, normal = trajectory.position(times), trajectory.normal(times)
+    held = Held(np.zeros(m), robot.rest)
+    path = StaticPath(times, np.zeros((count, m)), np.zeros((count, m)), np.zeros(count))
+    for i in range(count):
+        target = position[i] if normal is None else np.concatenate((position[i], normal[i]))
+        held, path.error[i] = hold_pose(robot, target, held, limits)
+        path.drive[i], path.tension[i] = held.drive, held.shape.tension
+        _check_sample(path, i, target.size, robot, limits)
+    return path
+
+
+def hold_pose(robot: Robot, target: Array, start: Held, limits: DriveLimits) -> tuple[Held, float]:
+    """Find the drives that hold an end pose.
+
+    Args:
+        robot: The robot.
+        target: End position [m], and end normal if it matters (3,) or (6,).
+        start: Drives and shape to start from.
+        limits: Floor and reference of the tensions are used.
+
+    Returns:
+        The drives with their equilibrium, and the error left in units of REACHED.
+    """
+    held, error = start, _error(robot, target, start.shape)
+    for _ in range(MAX_ITERATIONS):
+        step, pulled = _newton_step(robot, target, held, limits)
+        if error < FINE and pulled < EVEN:
+            break
+        size = float(np.max(np.abs(step)))
+        held, found = _descend(robot, target, held, step * min(1.0, LONGEST_STEP / size), error)
+        if found is None:
+            break
+        error = found
+    return held, error
+
+
+def _pose(robot: Robot, shape: Equilibrium) -> Array:
+    return np.concatenate((pose.position(shape.q, robot.tip), pose.normal(shape.q, robot.tip)))
+
+
+def _error(robot: Robot, target: Array, shape: Equilibrium) -> float:
+    left = (target - _pose(robot, shape)[: target.size]) / REACHED[: target.size]
+    return float(np.max(np.abs(left)))
+
+
+def _descend(robot: Robot, target: Array, held: Held, step: Array, error: float) -> tuple[Held, float | None]:
+    """Go along ``step``, by half and half again, until the error shrinks or is small; None if it does not."""
+    for _ in range(MAX_HALVINGS):
+        drive = held.drive + step
+        try:
+            shape = equilibrium(robot.model, drive, robot.weight, held.shape.q, held.drive)
+        except NoEquilibriumError:
+            shape = None
+        if shape is not None:
+            found = _error(robot, target, shape)
+            if found < max(error, FINE):
+                return Held(drive, shape), found
+        step = 0.5 * step
+    return held, None
+
+
+def _newton_step(robot: Robot, target: Array, held: Held, limits: DriveLimits) -> tuple[Array, float]:
+    """Change of the drives (m,) [m] that removes the error and, where that leaves a choice, evens tensions.
+
+    Also returns by how much the second part changes a tension at most [N].
+    """
+    rows, first = target.size, 3 * (robot.tip - FIXED)
+    scale = REACHED[:rows]
+    response = pose.output_matrix(held.shape.q, robot.tip) @ held.shape.gain[first : first + 9]
+    tip, turn = response[:rows], TURN_WEIGHT * response[3:6]
+    left = target - _pose(robot, held.shape)[:rows]
+    U, s, Vt = np.linalg.svd(tip / scale[:, None])
+    rank = int(np.count_nonzero(s > RANK * s[0]))
+    step: Array = Vt[:rank].T @ (U[:, :rank].T @ (left / scale) / s[:rank])
+    free = Vt[rank:].T
+    if not free.size:
+        return step, 0.0
+    tension, gain = _tensions(robot, held)
+    weight = np.where(tension < limits.floor, SLACK_WEIGHT, 1.0)
+    missing = weight * (limits.reference - tension - gain @ step)
+    system = np.vstack((weight[:, None] * (gain @ free), turn @ free, DRIVE_WEIGHT * free))
+    wanted = np.concatenate((missing, -turn @ step, -DRIVE_WEIGHT * step))
+    even = free @ np.linalg.lstsq(system, wanted, rcond=None)[0]
+    return step + even, float(np.max(np.abs(gain @ even)))
+
+
+def _tensions(robot: Robot, held: Held) -> tuple[Array, Array]:
+    """Tensions (m,) [N], negative for what a slack cable lacks, and their derivatives (m, m) [N/m]."""
+    model, q = robot.model, held.shape.q
+    length, G = np.zeros(robot.n_cables), np.zeros((robot.n_cables, q.size))
+    sliding_cable.path_gradients(
+        q, model.first_hole, model.hole_nodes, model.hole_weights, model.cables, length, G
+    )
+    stiffness = model.cables[:, sliding_cable.STIFFNESS]
+    tension = stiffness * (length + held.drive - model.cables[:, sliding_cable.REST])
+    gain = stiffness[:, None] * (np.eye(robot.n_cables) + G[:, 3 * FIXED :] @ held.shape.gain)
+    return tension, gain
+
+
+def _check_sample(path: StaticPath, i: int, rows: int, robot: Robot, limits: DriveLimits) -> None:
+    """Raise the first limit that sample ``i`` breaks."""
+    t, names = float(path.time[i]), robot.cable_names
+    if path.error[i] > 1.0:
+        what = (
+            "distance of the end from its place" if rows == 3 else "error of the end pose (1 mm or 0.5 deg)"
+        )
+        hint = "The place is out of reach: make the drawing smaller, or move it towards the rest position."
+        raise InfeasibleError(t, what, path.error[i], 1.0, "mm" if rows == 3 else "of 1", hint=hint)
+    tension, drive = path.tension[i], path.drive[i]
+    low, high = int(np.argmin(tension)), int(np.argmax(tension))
+    if tension[low] < limits.floor:
+        hint = "Move the path up (a shorter robot is tighter), or lower controller.tension.floor_n."
+        raise InfeasibleError(t, f"tension of cable {names[low]}", tension[low], limits.floor, "N", hint=hint)
+    if tension[high] > limits.ceiling:
+        what = f"tension of cable {names[high]}"
+        raise InfeasibleError(t, what, tension[high], limits.ceiling, "N", hint="Move the path down.")
+    _check_stroke(t, drive, robot)
+    if i > 0:
+        speed = np.abs(drive - path.drive[i - 1]) / (path.time[i] - path.time[i - 1])
+        fast = int(np.argmax(speed))
+        if speed[fast] > limits.speed:
+            what, hint = f"speed of drive {names[fast]}", "Lower the speed limits of the trajectory."
+            raise InfeasibleError(t, what, 1e3 * speed[fast], 1e3 * limits.speed, "mm/s", hint=hint)
+
+
+def _check_stroke(t: float, drive: Array, robot: Robot) -> None:
+    low, high = robot.stroke
+    for name, length in zip(robot.cable_names, drive.tolist(), strict=True):
+        if not low <= length <= high:
+            limit = low if length < low else high
+            raise InfeasibleError(t, f"length of drive {name}", 1e3 * length, 1e3 * limit, "mm")

@@ -1,0 +1,93 @@
+"""When the steps of a run begin: at once, or by the clock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Final, Protocol
+
+#: Longest time a wait goes without looking whether the run shall stop [s].
+LONGEST_NAP: Final = 0.05
+
+
+class Pace(Protocol):
+    """Lets the steps begin."""
+
+    def wait(self, t: float) -> float:
+        """Wait until the step of time ``t`` [s] may begin; return how late it is [s].
+
+        Raises:
+            RunInterruptedError: If a signal asked the run to stop.
+        """
+        ...
+
+    def now(self) -> float:
+        """Time of a clock that never jumps, for measuring durations [s]."""
+        ...
+
+
+def _go_on() -> None:
+    """Nothing asks the run to stop."""
+
+
+class Unpaced:
+    """Every step begins as soon as the one before has ended: simulation as fast as it goes."""
+
+    def __init__(self, check: Callable[[], None] = _go_on) -> None:
+        """Make a pace; ``check`` raises if the run shall stop."""
+        self._check = check
+
+    def wait(self, t: float) -> float:
+        """Do not wait; never late."""
+        del t
+        self._check()
+        return 0.0
+
+    def now(self) -> float:
+        """Return the performance counter [s]."""
+        return time.perf_counter()
+
+
+class RealTime:
+    """Step k begins at the start plus k periods, whatever the steps before took.
+
+    A step that is late by less than a period does not move the ones after it. One that is later does: the run
+    goes on from there at its own rate, because the steps that were missed cannot be made up for, and a burst
+    of them would send the robot commands meant for other times.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        check: Callable[[], None] = _go_on,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Make a pace whose clock starts with the first wait.
+
+        Args:
+            period: Time between two steps [s].
+            check: Raises if the run shall stop.
+            clock: Never jumps [s].
+            sleep: Waits for a time [s].
+        """
+        self._period, self._check, self._clock, self._sleep = period, check, clock, sleep
+        self._start: float | None = None
+
+    def wait(self, t: float) -> float:
+        """Wait until the start plus ``t``; return the lateness [s]."""
+        self._check()
+        if self._start is None:
+            self._start = self._clock() - t
+        while (left := self._start + t - self._clock()) > 0.0:
+            self._sleep(min(left, LONGEST_NAP))
+            self._check()
+        late = -left
+        if late > self._period:
+            self._start += late
+        return late
+
+    def now(self) -> float:
+        """Return the clock [s]."""
+        return self._clock()

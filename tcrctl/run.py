@@ -1,0 +1,193 @@
+"""Composition root: a prepared experiment is run and recorded, and leaves a folder with log and summary.
+
+LoadedSpec -> prepare -> plan -> run_experiment: folder, log, parts -> loop -> summary -> stop record
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedError, TcrctlError
+from tcrctl.experiment import Experiment, Notify, Parts, build_parts, silent
+from tcrctl.interruption import Interruption
+from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.writer import LogWriter
+from tcrctl.loop import run_loop
+from tcrctl.metrics import Metrics
+from tcrctl.pacing import Pace, RealTime, Unpaced
+from tcrctl.provenance import attachments, resolved_text, start_metadata
+from tcrctl.robot.model import FIXED, ring_rows
+from tcrctl.robot.robot import Robot
+from tcrctl.run_folder import LOG, RESOLVED, SPEC, SUMMARY, RunFolder, check_writable, make_run_folder
+from tcrctl.signals import StepRecord
+from tcrctl.summary import Summary, Verdict, judge
+
+Progress = Callable[[int, int], None]
+
+
+def _no_progress(done: int, total: int) -> None:
+    """Show nothing."""
+
+
+def run_experiment(
+    experiment: Experiment,
+    *,
+    out: Path,
+    realtime: bool = False,
+    notify: Notify = silent,
+    progress: Progress = _no_progress,
+) -> Summary:
+    """Run an experiment and record it.
+
+    However the run ends, the plant is left safe, the log is finished and the signals are given back.
+
+    Args:
+        experiment: What :func:`tcrctl.experiment.prepare` made.
+        out: Where the run's folder is made.
+        realtime: Pace a simulated plant by the clock.
+        notify: Takes messages for the user.
+        progress: Takes the number of steps done and their total, after every step.
+
+    Returns:
+        The result; also of a run that was stopped by a limit, a signal or a device.
+
+    Raises:
+        DeviceError: If the run cannot be recorded or the plant not be reached; no folder is left behind.
+    """
+    check_writable(out)
+    with Interruption() as interruption:
+        pace = RealTime(experiment.period, interruption.check) if realtime else Unpaced(interruption.check)
+        parts = build_parts(experiment)
+        try:
+            folder = make_run_folder(out, experiment.spec.name)
+            log = _open_log(experiment, folder, realtime=realtime)
+        except BaseException:
+            parts.plant.close()
+            raise
+        summary = _recorded_run(experiment, parts, pace, folder, log, progress)
+    try:
+        folder.write(SUMMARY, (json.dumps(summary.as_json(), indent=2) + "\n").encode())
+    except DeviceError as error:  # the run is over and in the log
+        notify(f"warning: {error}")
+    return summary
+
+
+def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool) -> LogWriter:
+    """Write what is known before the first step; on failure the folder is as if it had never been."""
+    spec, loaded = experiment.spec, experiment.loaded
+    try:
+        folder.write(SPEC, loaded.given_text)
+        folder.write(RESOLVED, resolved_text(spec))
+        return LogWriter(
+            folder.path / LOG,
+            attachments=attachments(loaded, spec),
+            start=start_metadata(folder.run_id, loaded, spec, realtime=realtime),
+            geometry=log_geometry(experiment.robot),
+            epoch_ns=time.time_ns(),
+            period_s=experiment.period,
+            flush_s=spec.log.flush_s,
+            flush_steps=spec.log.flush_steps,
+            fsync=spec.log.fsync,
+            wait_when_full=not realtime,
+        )
+    except BaseException:
+        folder.discard()
+        raise
+
+
+def log_geometry(robot: Robot) -> LogGeometry:
+    """Return the names and the topology that the log needs to draw a robot."""
+    model, routes = robot.model, []
+    for c, name in enumerate(robot.cable_names):
+        holes = slice(model.first_hole[c], model.first_hole[c + 1])
+        routes.append(CableRoute(name, model.hole_nodes[holes], model.hole_weights[holes]))
+    return LogGeometry(robot.n_modules, tuple(routes), tuple(ring_rows(robot.n_modules)), robot.tip // FIXED)
+
+
+def _recorded_run(
+    experiment: Experiment, parts: Parts, pace: Pace, folder: RunFolder, log: LogWriter, progress: Progress
+) -> Summary:
+    """Run, close the plant, finish the log."""
+    metrics = Metrics(experiment.steps, paced=isinstance(pace, RealTime))
+
+    def record(step: StepRecord) -> None:
+        log.step(step)
+        metrics.add(step)
+        progress(step.k + 1, experiment.steps)
+
+    with log:
+        failure = _drive(experiment, parts, pace, record, log)
+        summary = _summary(experiment, folder, metrics, failure)
+        try:
+            if failure is not None:
+                kind = "limit" if isinstance(failure, StoppedError) else "stop"
+                log.event(summary.measures.duration_s, kind, "error", str(failure))
+            stop = {"status": summary.status, "reason": summary.reason}
+            log.finish({**stop, "summary": json.dumps(summary.as_json())})
+        except LogError as error:
+            if failure is None:
+                summary = replace(summary, status="error", reason=str(error), exit_code=error.exit_code)
+    return summary
+
+
+def _drive(
+    experiment: Experiment, parts: Parts, pace: Pace, record: Callable[[StepRecord], None], log: LogWriter
+) -> TcrctlError | None:
+    """Go through all steps and leave the plant safe; return why it ended before the end, if it did."""
+    failure: TcrctlError | None = None
+    try:
+        log.event(0.0, "start", "info", f"start is {1e3 * parts.start_offset:.3f} mm beside the trajectory's")
+        run_loop(
+            parts.trajectory,
+            parts.estimator,
+            parts.controller,
+            parts.plant,
+            record,
+            period=experiment.period,
+            duration=parts.trajectory.duration,
+            pace=pace,
+            limits=experiment.safety,
+        )
+    except TcrctlError as error:
+        failure = error
+    finally:
+        try:
+            parts.plant.close()
+        except TcrctlError as error:  # what ended the run first is the reason
+            failure = failure or error
+    return failure
+
+
+def _summary(
+    experiment: Experiment, folder: RunFolder, metrics: Metrics, failure: TcrctlError | None
+) -> Summary:
+    spec = experiment.spec
+    summary = Summary(
+        run_id=folder.run_id,
+        spec=spec.name,
+        robot=experiment.robot.name,
+        plant=spec.plant.kind,
+        controller=spec.controller.kind,
+        status="success",
+        reason="",
+        exit_code=0,
+        measures=metrics.measures(),
+        criteria=(),
+        log=folder.path / LOG,
+    )
+    verdicts = judge(spec.criteria, summary.as_json())
+    status, reason, exit_code = _outcome(failure, verdicts)
+    return replace(summary, criteria=verdicts, status=status, reason=reason, exit_code=exit_code)
+
+
+def _outcome(failure: TcrctlError | None, verdicts: tuple[Verdict, ...]) -> tuple[str, str, int]:
+    """Status, reason and exit code of a run."""
+    if failure is not None:
+        aborted = isinstance(failure, StoppedError | RunInterruptedError)
+        return "aborted" if aborted else "error", str(failure), failure.exit_code
+    missed = [str(verdict) for verdict in verdicts if not verdict.passed]
+    return ("failed", "; ".join(missed), 3) if missed else ("success", "", 0)

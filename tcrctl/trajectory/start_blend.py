@@ -1,0 +1,76 @@
+"""The trajectory as it is run: from where the robot really is, smoothly onto the wanted path."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcrctl.numerics import rotation
+from tcrctl.signals import Array
+from tcrctl.trajectory.trajectory import Trajectory
+
+
+def fade_out(x: Array) -> Array:
+    """Return 1 at x <= 0, 0 at x >= 1 (n,); three derivatives vanish at both ends (septic smoothstep)."""
+    x = np.clip(x, 0.0, 1.0)
+    faded: Array = 1.0 - x**4 * (35.0 - x * (84.0 - x * (70.0 - 20.0 * x)))
+    return faded
+
+
+class StartBlend:
+    """A trajectory plus the offset of the robot's start pose, which fades out within ``blend`` [s].
+
+    A real robot at rest stands a millimetre or a degree beside its model. Without this, every run would begin
+    with a step of the reference, and a step excites the slow modes.
+
+    Attributes:
+        duration: That of the trajectory [s].
+    """
+
+    def __init__(self, trajectory: Trajectory, position: Array, normal: Array, blend: float) -> None:
+        """Take up a trajectory.
+
+        Args:
+            trajectory: What is wanted.
+            position: End position of the robot before the first step (3,) [m].
+            normal: Its unit end normal (3,); not used if the trajectory leaves the orientation free.
+            blend: Time in which the offset fades out [s]; 0: no offset, the run begins with a step.
+        """
+        self._trajectory, self._blend = trajectory, blend
+        zero = np.zeros(1)
+        self._offset = position - trajectory.position(zero)[0]
+        wanted = trajectory.normal(zero)
+        self._turn = np.zeros(3)
+        if wanted is not None:
+            self._turn = rotation.quaternion_log(rotation.rotation_between(wanted[0], normal))
+
+    @property
+    def duration(self) -> float:
+        """Duration of the trajectory [s]."""
+        return self._trajectory.duration
+
+    def position(self, t: Array) -> Array:
+        """Return end positions at times t (n,) [s] as (n, 3) [m]."""
+        position: Array = self._trajectory.position(t) + self._left(t)[:, None] * self._offset
+        return position
+
+    def normal(self, t: Array) -> Array | None:
+        """Return unit end normals at times t (n,) [s] as (n, 3), or None if the orientation is free."""
+        wanted = self._trajectory.normal(t)
+        return None if wanted is None else _turned(wanted, self._left(t)[:, None] * self._turn)
+
+    def _left(self, t: Array) -> Array:
+        """Part of the offset that is left at times t (n,)."""
+        return fade_out(t / self._blend) if self._blend > 0.0 else np.zeros(t.shape)
+
+
+def _turned(vectors: Array, turns: Array) -> Array:
+    """Rotate each of ``vectors`` (n, 3) by its rotation vector (n, 3) [rad], formula of Rodrigues."""
+    angle = np.linalg.norm(turns, axis=1, keepdims=True)
+    axis = turns / np.where(angle > 0.0, angle, 1.0)
+    along = np.sum(axis * vectors, axis=1, keepdims=True)
+    turned: Array = (
+        vectors * np.cos(angle)
+        + np.cross(axis, vectors) * np.sin(angle)
+        + axis * along * (1.0 - np.cos(angle))
+    )
+    return turned
