@@ -5,6 +5,9 @@ that were applied, and with springs of stiffness S from its ring nodes to their 
 would stretch rods is rejected by the rods' own stiffness, while the soft modes follow the markers; springs and
 backward Euler can only store or dissipate energy, so the observer is stable whatever the mismatch.
 
+Between rings that are not seen, a mismatched model pushes against the springs like a column between two walls, and
+buckles if they are hard. So the stiffness falls with the square of the share of markers that are seen.
+
 A mismatched model keeps the springs stretched. So the end pose is corrected by the filtered difference between
 the measured tip ring and the model's; while the tip ring is not seen, the last correction stays.
 """
@@ -49,7 +52,7 @@ class PassiveObserver:
         s.nodal[FORCE] = self._robot.weight
         s.nodal[SPRING] = 0.0
         coordinates = (3 * self._rows[measured.valid, None] + np.arange(3)).ravel()
-        s.nodal[SPRING, coordinates] = self._stiffness
+        s.nodal[SPRING, coordinates] = self._stiffness * float(np.mean(measured.valid)) ** 2
         s.nodal[SPRING_AT, coordinates] = measured.nodes[measured.valid].astype(float).ravel()
         dynamics.lengths_before(model, self._q, self._v, self._drive, self._still, 0.0, s, self._work)
         return Load(inertia, 1.0 / h, s.nodal, s.bar_before, s.cable_before)

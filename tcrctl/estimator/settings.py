@@ -14,7 +14,10 @@ class PassiveObserverSettings(Settings):
 
     kind: Literal["passive_observer"]
     stiffness_n_m: float = quantity(
-        "N/m", "virtual spring from every measured node to its measurement", 2.0e4, gt=0
+        "N/m",
+        "virtual spring to every marker when all are seen; falls with the square of the seen share",
+        1.0e4,
+        gt=0,
     )
     pose_filter_s: float = quantity(
         "s", "time constant of the end pose's correction by the measured tip ring", 0.5, gt=0
