@@ -13,6 +13,8 @@ the lightly damped lateral mode out of Δ. See docs/control.md.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -20,9 +22,9 @@ from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.predictor import Forecast
 from tcrctl.controller.settings import IocSettings
 from tcrctl.robot import linear, pose, response
-from tcrctl.robot.equations import Workspace, make_workspace
+from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.model import FIXED, Model
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Estimate
@@ -69,72 +71,148 @@ def superpose(change: Array, now: Array, edges: Array) -> tuple[Array, Array]:
     return free, gain
 
 
+class Memory(NamedTuple):
+    """What the predictor keeps from step to step, changed in place.
+
+    Attributes:
+        equilibrium: q_eq (3 n_nodes,) [m].
+        drive: Drives it belongs to (m,) [m].
+        gain: ∂q_eq/∂d (12 n_modules, m).
+        offset: Δ (3 n_nodes,) [m].
+        v: Velocities of the last estimate (3 n_nodes,) [m/s].
+        basis: Basis of the response (12 n_modules, modes + m).
+    """
+
+    equilibrium: Array
+    drive: Array
+    gain: Array
+    offset: Array
+    v: Array
+    basis: Array
+
+
 @njit(cache=True, error_model="numpy")
-def _inertia_lag(mass: Array, damping: float, acceleration: Array, v: Array, ws: Workspace) -> Array:
-    """K^-1 M (a + α v) (12 n_modules,) [m] with the static factor in ``ws``."""
+def _follow(model: Model, load: Load, ws: Workspace, memory: Memory, drive: Array) -> Outcome:
+    """Move the model's equilibrium to ``drive``, starting where its static gain points to."""
+    q = memory.equilibrium.copy()
+    q[3 * FIXED :] += np.dot(memory.gain, drive - memory.drive)
+    outcome = minimise(model, q, drive, load, ws, TOLERANCE, int(MAX_ITERATIONS), bool(1))
+    if outcome.converged:
+        memory.equilibrium[:], memory.drive[:] = q, drive
+        linear.couple(ws, ws.r)
+        linear.drive_gain(ws, memory.gain)
+    return outcome
+
+
+@njit(cache=True, error_model="numpy")
+def _update_offset(
+    model: Model, ws: Workspace, memory: Memory, deviation: Array, v: Array, period: float, blend: float
+) -> None:
+    """Filter the displacement of the point that the robot vibrates about: δ + K^-1 M (a + α v)."""
     force, lag = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
     for k in range(force.shape[0]):
-        i, a = k // 12, k % 12
+        i, row = k // 12, k % 12
         for b in range(12):
             j = 12 * (i + 1) + b
-            force[k] += mass[i, a, b] * (acceleration[j] + damping * v[j])
+            force[k] += model.mass[i, row, b] * ((v[j] - memory.v[j]) / period + model.damping * v[j])
     linear.solve(ws, force, lag)
-    return lag
+    for k in range(force.shape[0]):
+        j = 3 * FIXED + k
+        memory.offset[j] += blend * (deviation[j] + lag[k] - memory.offset[j])
+
+
+@njit(cache=True, error_model="numpy")
+def forecast(
+    model: Model,
+    load: Load,
+    ws: Workspace,
+    memory: Memory,
+    q: Array,
+    v: Array,
+    drive: Array,
+    period: float,
+    blend: float,
+    ahead: Array,
+    edges: Array,
+    tip: int,
+    now: Array,
+) -> tuple[Outcome, bool, Array, Array]:
+    """One prediction as in the module's docstring, in one kernel.
+
+    Args:
+        model: Robot arrays.
+        load: Static load.
+        ws: Workspace.
+        memory: State of the predictor, moved on by one step.
+        q: Node positions now (3 n_nodes,) [m].
+        v: Node velocities (3 n_nodes,) [m/s].
+        drive: Drive lengths (m,) [m].
+        period: Control period [s].
+        blend: Part of the way that Δ goes in one step; 0 keeps it.
+        ahead: Prediction instants (n,) [s], equally spaced.
+        edges: Instants at which input blocks begin, and the end (blocks + 1,).
+        tip: Row of the first node of the tip ring.
+        now: Outputs now (7 + m,).
+
+    Returns:
+        Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m).
+    """  # fmt: skip
+    outcome = _follow(model, load, ws, memory, drive)
+    deviation = q - memory.equilibrium
+    if outcome.converged and blend > 0.0 and np.all(np.isfinite(deviation)) and np.all(np.isfinite(v)):
+        _update_offset(model, ws, memory, deviation, v, period, blend)
+    memory.v[:] = v
+    change, stable = response.respond(
+        model,
+        memory.equilibrium,
+        deviation - memory.offset,
+        v,
+        ahead[0],
+        ahead.shape[0],
+        tip,
+        ws,
+        memory.basis,
+    )
+    free, gain = superpose(change, now, edges)
+    return outcome, stable, free, gain
 
 
 class MultiStep:
-    """See the module's docstring. State: equilibrium, offset Δ and last velocity."""
+    """See the module's docstring."""
 
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
-        self._robot = robot
-        self._step = settings.horizon_s / settings.instants
-        self.ahead: Array = np.arange(1.0, settings.instants + 1.0) * self._step
+        self._robot, self._period = robot, settings.period_s
+        self.ahead: Array = np.arange(1.0, settings.instants + 1.0) * (settings.horizon_s / settings.instants)
         self.blocks = settings.blocks
         self._edges = block_edges(settings.instants, settings.blocks)
-        self._period = settings.period_s
         offset = settings.offset
         self._blend = 0.0 if offset is None else -float(np.expm1(-settings.period_s / offset.filter_s))
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
-        self._equilibrium = robot.rest.q.copy()
-        self._offset, self._v = np.zeros_like(robot.rest.q), np.zeros_like(robot.rest.q)
-        self._drive, self._gain = np.zeros(robot.n_cables), robot.rest.gain.copy()
-        self._follow(self._drive)
-        self._basis = response.start_basis(robot.model, self._work, settings.modes)
-
-    def _follow(self, drive: Array) -> Outcome:
-        """Move the model's equilibrium to ``drive``, starting where its static gain points to."""
-        q = self._equilibrium.copy()
-        q[3 * FIXED :] += self._gain @ (drive - self._drive)
-        outcome = Outcome(
-            *minimise(self._robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
+        rest, still = robot.rest.q, np.zeros_like(robot.rest.q)
+        minimise(
+            robot.model,
+            rest.copy(),
+            np.zeros(robot.n_cables),
+            self._load,
+            self._work,
+            TOLERANCE,
+            MAX_ITERATIONS,
+            True,
         )
-        if outcome.converged:
-            self._equilibrium, self._drive = q, drive.copy()
-            linear.couple(self._work, self._work.r)
-            linear.drive_gain(self._work, self._gain)
-        return outcome
-
-    def _update_offset(self, deviation: Array, v: Array) -> None:
-        """Filter the displacement of the point that the robot vibrates about."""
-        model = self._robot.model
-        acceleration = (v - self._v) / self._period
-        centre = deviation.copy()
-        centre[3 * FIXED :] += _inertia_lag(model.mass, model.damping, acceleration, v, self._work)
-        self._offset = self._offset + self._blend * (centre - self._offset)
+        basis = response.start_basis(robot.model, self._work, settings.modes)
+        self._memory = Memory(
+            rest.copy(), np.zeros(robot.n_cables), robot.rest.gain.copy(), still, still.copy(), basis
+        )
 
     def predict(self, estimate: Estimate, age: float, speed: Array) -> Forecast:
         """See :class:`Predictor`."""
         del speed  # the prediction is linear: it does not depend on the last input
-        outcome = self._follow(estimate.drive)
-        deviation = estimate.q + age * estimate.v - self._equilibrium
-        if outcome.converged and self._blend:
-            self._update_offset(deviation, estimate.v)
-        self._v = estimate.v
-        change, stable = response.respond(
-            self._robot.model, self._equilibrium, deviation - self._offset, estimate.v, self._step,
-            self.ahead.shape[0], self._robot.tip, self._work, self._basis,
+        outcome, stable, free, gain = forecast(
+            self._robot.model, self._load, self._work, self._memory, estimate.q + age * estimate.v, estimate.v,
+            estimate.drive, self._period, self._blend, self.ahead, self._edges, self._robot.tip,
+            outputs(estimate, age, self._robot),
         )  # fmt: skip
-        free, gain = superpose(change, outputs(estimate, age, self._robot), self._edges)
+        outcome = Outcome(*outcome)
         good = outcome.converged and stable
         reason = "" if good else "the model has no stable equilibrium at the present drives"
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason)
