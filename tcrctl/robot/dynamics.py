@@ -122,10 +122,17 @@ def try_step(
     return outcome
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def advance(
-    model: Model, x: State, speed: Array, duration: float, step: float, rho: float, external: Array,
-    ws: Workspace, s: Scratch,
+    model: Model,
+    x: State,
+    speed: Array,
+    duration: float,
+    step: float,
+    rho: float,
+    external: Array,
+    ws: Workspace,
+    s: Scratch,
 ) -> tuple[bool, float, float, int]:
     """Advance the state in place by ``duration`` with constant drive speeds.
 
