@@ -1,0 +1,66 @@
+"""Compiled kernels that are never stale, and the shipped robots, built once per session."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from tcrctl.robot.robot import Robot
+
+ROOT = Path(__file__).parents[1]
+#: Compiled kernels of former states of the sources are removed after a week.
+KEPT_S = 7 * 86400.0
+
+
+def kernel_key() -> str:
+    """Hash of all sources with kernels: numba itself does not notice edits in files that a kernel imports."""
+    digest = hashlib.sha256()
+    for path in sorted((ROOT / "tcrctl").rglob("*.py")):
+        source = path.read_bytes()
+        if b"numba" in source:
+            digest.update(str(path.relative_to(ROOT)).encode() + b"\0" + source + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Before numba is imported: one folder of compiled kernels per state of the sources, for all workers."""
+    if "PYTEST_XDIST_WORKER" in os.environ or config.cache is None:
+        return  # workers inherit the folder
+    folders = config.cache.mkdir("kernels")
+    for folder in folders.iterdir():
+        if time.time() - folder.stat().st_mtime > KEPT_S:
+            shutil.rmtree(folder, ignore_errors=True)
+    os.environ["NUMBA_CACHE_DIR"] = str(folders / kernel_key())
+
+
+def shipped(name: str) -> Robot:
+    """Build a shipped robot."""
+    from tcrctl.robot.description import load_robot
+    from tcrctl.robot.robot import build_robot
+
+    return build_robot(load_robot(name))
+
+
+@pytest.fixture(scope="session")
+def tcr600() -> Robot:
+    """Single-segment robot: 11 modules, three cables."""
+    return shipped("tcr600")
+
+
+@pytest.fixture(scope="session")
+def tcr700() -> Robot:
+    """Two-segment robot: 13 modules, six cables."""
+    return shipped("tcr700")
+
+
+@pytest.fixture(scope="session")
+def tcr5x4() -> Robot:
+    """Short robot: five modules, four cables."""
+    return shipped("tcr5x4")
