@@ -72,6 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
+    _prepare_process()
     given = list(sys.argv[1:] if arguments is None else arguments)
     as_json = "--json" in given
     try:
@@ -86,6 +87,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         return _report(_known(error), error, as_json)
     return 0
+
+
+def _prepare_process() -> None:
+    """Keep the control step undisturbed: no threads for small matrices, short turns for the log's thread."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    sys.setswitchinterval(2e-4)
 
 
 def _known(error: Exception) -> TcrctlError:
