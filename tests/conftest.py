@@ -31,7 +31,7 @@ def kernel_key() -> str:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Before numba is imported: one folder of compiled kernels per state of the sources, for all workers."""
-    if "PYTEST_XDIST_WORKER" in os.environ or config.cache is None:
+    if "PYTEST_XDIST_WORKER" in os.environ or getattr(config, "cache", None) is None:
         return  # workers inherit the folder
     folders = config.cache.mkdir("kernels")
     for folder in folders.iterdir():

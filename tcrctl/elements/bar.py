@@ -5,8 +5,8 @@ e = (r_j - r_i) / l, the bar's tension and its force on node j are
 
     T = k (l - l0) + c dl/dt,    k = EA / l0,    f_j = T e  (resisting, hence +T e in the residual)
 
-A tension-only bar has T = max(0, ...). An implicit rule gives dl/dt = w (l - l_before); then T is the derivative
-of the scalar T² / (2 (k + c w)) and the tangent for a change of r_j - r_i is
+A tension-only bar has T = max(0, ...). An implicit rule gives dl/dt = w (l - l_before); then T is the
+derivative of the scalar T² / (2 (k + c w)) and the tangent for a change of r_j - r_i is
 (k + c w) e e' + T / l (I - e e').  Source: [TCR] Sec. III.A and its reference [30].
 """
 
@@ -16,7 +16,6 @@ import numpy as np
 from numba import njit
 
 from tcrctl.signals import Array
-
 
 #: Columns of the bar parameters (n_bars, 4): l0 [m], EA / l0 [N/m], damping [N s/m], 1 if tension only.
 REST, STIFFNESS, DAMPING, TENSION_ONLY = range(4)
@@ -38,7 +37,7 @@ def tension(length: float, w: float, before: float, bars: Array, b: int) -> floa
     T = bars[b, STIFFNESS] * (length - bars[b, REST]) + bars[b, DAMPING] * w * (length - before)
     if T < 0.0 and bars[b, TENSION_ONLY] != 0.0:
         return 0.0
-    return T
+    return float(T)
 
 
 @njit(cache=True, error_model="numpy")
@@ -46,8 +45,7 @@ def lengths_and_rates(q: Array, v: Array, nodes: np.ndarray, length: Array, rate
     """Fill lengths [m] and dl/dt [m/s] (n_bars,) of the bars between ``nodes`` (n_bars, 2)."""
     for b in range(nodes.shape[0]):
         i, j = nodes[b, 0], nodes[b, 1]
-        l, ex, ey, ez = direction(q, i, j)
-        length[b] = l
+        length[b], ex, ey, ez = direction(q, i, j)
         rate[b] = (
             (v[3 * j] - v[3 * i]) * ex
             + (v[3 * j + 1] - v[3 * i + 1]) * ey

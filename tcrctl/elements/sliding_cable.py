@@ -6,9 +6,9 @@ l(q) = lead + Σ_h |p_{h+1} - p_h|, the drive d (length taken in) and the rest l
     λ = T = max(0, k (l(q) + d - l0) + c (dl/dt + u)),    k = EA / l0,    u = dd/dt
 
 which is the driving constraint Φ of (6)-(8) and (20) with the massless actuation node eliminated: Φ_q' λ in
-(9) becomes T ∂l/∂q. T is the same along the path, so ∂l/∂p_h is the difference of two unit vectors and ∂²l/∂q²
-is block banded and positive semidefinite (l is convex), with (I - e e') / length per segment. An implicit rule
-gives dl/dt + u = w (l + d - before); then T is the derivative of T² / (2 (k + c w)).
+(9) becomes T ∂l/∂q. T is the same along the path, so ∂l/∂p_h is the difference of two unit vectors and
+∂²l/∂q² is block banded and positive semidefinite (l is convex), with (I - e e') / length per segment. An
+implicit rule gives dl/dt + u = w (l + d - before); then T is the derivative of T² / (2 (k + c w)).
 """
 
 from __future__ import annotations
@@ -60,18 +60,26 @@ def _spread(
 
 @njit(cache=True, error_model="numpy")
 def path_gradients(
-    q: Array, first_hole: np.ndarray, nodes: np.ndarray, weights: Array, cables: Array, length: Array, G: Array
+    q: Array,
+    first_hole: np.ndarray,
+    nodes: np.ndarray,
+    weights: Array,
+    cables: Array,
+    length: Array,
+    G: Array,
 ) -> None:
     """Fill path lengths (m,) [m] and G = ∂l/∂q (m, 3 n_nodes).
 
     Holes of cable c are first_hole[c] .. first_hole[c + 1] - 1; ``cables`` (m, 4) as in the column names.
     """
-    G[:] = 0.0
+    for c in range(G.shape[0]):
+        for k in range(G.shape[1]):
+            G[c, k] = 0.0
     for c in range(cables.shape[0]):
         length[c] = cables[c, LEAD]
         for h in range(first_hole[c], first_hole[c + 1] - 1):
-            l, ex, ey, ez = segment(q, nodes, weights, h)
-            length[c] += l
+            stretch, ex, ey, ez = segment(q, nodes, weights, h)
+            length[c] += stretch
             _spread(G, c, nodes, weights, h, -ex, -ey, -ez)
             _spread(G, c, nodes, weights, h + 1, ex, ey, ez)
 
@@ -80,4 +88,4 @@ def path_gradients(
 def tension(total: float, w: float, before: float, cables: Array, c: int) -> float:
     """λ = T [N] >= 0 of cable ``c`` at ``total`` = l + d [m] with dl/dt + u = w (total - before)."""
     T = cables[c, STIFFNESS] * (total - cables[c, REST]) + cables[c, DAMPING] * w * (total - before)
-    return max(T, 0.0)
+    return float(max(T, 0.0))

@@ -65,7 +65,7 @@ def solve_upper(U: Array, X: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _subtract_transposed_product(target: Array, left: Array, right: Array) -> None:
-    """target -= left' right, all row-major."""
+    """Subtract left' right from ``target``, all row-major."""
     rows, cols = target.shape
     for k in range(left.shape[0]):
         for r in range(rows):
@@ -77,7 +77,7 @@ def _subtract_transposed_product(target: Array, left: Array, right: Array) -> No
 
 @njit(cache=True, error_model="numpy")
 def _subtract_product(target: Array, left: Array, right: Array) -> None:
-    """target -= left right, all row-major."""
+    """Subtract left right from ``target``, all row-major."""
     rows, cols = target.shape
     for r in range(rows):
         for k in range(right.shape[0]):
@@ -111,6 +111,28 @@ def factor(A: Array) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
+def solve_forward(U: Array, X: Array) -> None:
+    """Overwrite the right-hand sides ``X`` (n b, r) by U'^-1 X, the first half of :func:`solve`."""
+    n, bands, b = U.shape[0], U.shape[1], U.shape[2]
+    for j in range(n):
+        here = X[j * b : (j + 1) * b]
+        solve_transposed(U[j, 0], here)
+        for d in range(1, min(bands, n - j)):
+            _subtract_transposed_product(X[(j + d) * b : (j + d + 1) * b], U[j, d], here)
+
+
+@njit(cache=True, error_model="numpy")
+def solve_backward(U: Array, X: Array) -> None:
+    """Overwrite ``X`` (n b, r) by U^-1 X, the second half of :func:`solve`."""
+    n, bands, b = U.shape[0], U.shape[1], U.shape[2]
+    for j in range(n - 1, -1, -1):
+        here = X[j * b : (j + 1) * b]
+        for d in range(1, min(bands, n - j)):
+            _subtract_product(here, U[j, d], X[(j + d) * b : (j + d + 1) * b])
+        solve_upper(U[j, 0], here)
+
+
+@njit(cache=True, error_model="numpy")
 def solve(U: Array, X: Array) -> None:
     """Overwrite the right-hand sides by the solution of U'U x = rhs.
 
@@ -118,17 +140,8 @@ def solve(U: Array, X: Array) -> None:
         U: Factor made by :func:`factor` (n, w + 1, b, b).
         X: Right-hand sides, one per column (n b, r).
     """
-    n, bands, b = U.shape[0], U.shape[1], U.shape[2]
-    for j in range(n):
-        here = X[j * b : (j + 1) * b]
-        solve_transposed(U[j, 0], here)
-        for d in range(1, min(bands, n - j)):
-            _subtract_transposed_product(X[(j + d) * b : (j + d + 1) * b], U[j, d], here)
-    for j in range(n - 1, -1, -1):
-        here = X[j * b : (j + 1) * b]
-        for d in range(1, min(bands, n - j)):
-            _subtract_product(here, U[j, d], X[(j + d) * b : (j + d + 1) * b])
-        solve_upper(U[j, 0], here)
+    solve_forward(U, X)
+    solve_backward(U, X)
 
 
 @njit(cache=True, error_model="numpy")
@@ -149,7 +162,7 @@ def _add_block_products(block: Array, diagonal: bool, i: int, j: int, X: Array, 
 
 @njit(cache=True, error_model="numpy")
 def multiply_columns(A: Array, X: Array, out: Array) -> None:
-    """out = A X for an unfactored block-banded matrix A (n, w + 1, b, b) and columns X (n b, r)."""
+    """Fill out = A X for an unfactored block-banded matrix A (n, w + 1, b, b) and columns X (n b, r)."""
     out[:] = 0.0
     for j in range(A.shape[0]):
         for d in range(min(A.shape[1], A.shape[0] - j)):

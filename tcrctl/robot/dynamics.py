@@ -1,8 +1,8 @@
 """One generalized-alpha step of the robot's DAE (9), with sub-steps where Newton needs them.
 
-(16) is solved for q_{k+1} by minimising the incremental potential; λ follows from the eliminated constraint (17).
-Velocities and accelerations are affine in q_{k+1} by (12)-(14). Elongation rates in the dampers use the trapezoidal
-rule, which keeps the second order and the symmetric tangent.
+(16) is solved for q_{k+1} by minimising the incremental potential; λ follows from the eliminated constraint
+(17). Velocities and accelerations are affine in q_{k+1} by (12)-(14). Elongation rates in the dampers use the
+trapezoidal rule, which keeps the second order and the symmetric tangent.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def lengths_before(
         s.cable_before[c] = ws.length[c] + drive[c] + lag * rate
 
 
-@njit(cache=True, error_model="numpy")
+@njit(inline="always", error_model="numpy")  # compiled once, inside advance
 def try_step(
     model: Model, x: State, speed: Array, h: float, rho: float, external: Array, ws: Workspace, s: Scratch
 ) -> Outcome:
@@ -118,11 +118,12 @@ def try_step(
             x.acceleration[k] += c.acceleration * moved
             x.v[k] = s.v0[k] + c.velocity * moved
             x.q[k] = s.q[k]
-        x.drive[:] = s.drive
+        for i in range(speed.shape[0]):
+            x.drive[i] = s.drive[i]
     return outcome
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(cache=True, error_model="numpy")
 def advance(
     model: Model,
     x: State,

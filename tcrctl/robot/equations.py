@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 
 from tcrctl.elements import bar, sliding_cable
+from tcrctl.robot import tangent
 from tcrctl.robot.model import FIXED, Model
 from tcrctl.signals import Array
 
@@ -56,8 +57,8 @@ class Workspace(NamedTuple):
         tension: λ (m,) [N].
         axial: k_c = ∂λ/∂(l + d) of taut cables, 0 of slack ones (m,) [N/m].
         length: Path lengths l (m,) [m].
-        columns: Right-hand sides of solves (12 n_modules, m + 1).
-        small: Matrix of the cable coupling (m, m).
+        columns: Cable columns and right-hand side of ``linear.couple`` (12 n_modules, m + 1).
+        small: Its factor of the cable coupling (m, m).
     """
 
     K: Array
@@ -89,38 +90,6 @@ def make_workspace(model: Model) -> Workspace:
 
 
 @njit(cache=True, error_model="numpy")
-def _add_pair(K: Array, i: int, j: int, f: float, s: Array) -> None:
-    """Add f * s, s = (xx, xy, xz, yy, yz, zz), at node pair (i, j) of the upper triangle of K."""
-    if i < FIXED or j < FIXED:
-        return
-    if i > j:
-        i, j = j, i
-    row, band = i // 4 - 1, j // 4 - i // 4
-    a, b = 3 * (i % 4), 3 * (j % 4)
-    K[row, band, a, b] += f * s[0]
-    K[row, band, a, b + 1] += f * s[1]
-    K[row, band, a, b + 2] += f * s[2]
-    K[row, band, a + 1, b] += f * s[1]
-    K[row, band, a + 1, b + 1] += f * s[3]
-    K[row, band, a + 1, b + 2] += f * s[4]
-    K[row, band, a + 2, b] += f * s[2]
-    K[row, band, a + 2, b + 1] += f * s[4]
-    K[row, band, a + 2, b + 2] += f * s[5]
-
-
-@njit(cache=True, error_model="numpy")
-def _fill_line(s: Array, axial: float, lateral: float, ex: float, ey: float, ez: float) -> None:
-    """s = axial e e' + lateral (I - e e') as (xx, xy, xz, yy, yz, zz)."""
-    d = axial - lateral
-    s[0] = d * ex * ex + lateral
-    s[1] = d * ex * ey
-    s[2] = d * ex * ez
-    s[3] = d * ey * ey + lateral
-    s[4] = d * ey * ez
-    s[5] = d * ez * ez + lateral
-
-
-@njit(cache=True, error_model="numpy")
 def _add_force(r: Array, node: int, x: float, y: float, z: float) -> None:
     """Add a force to the residual of a free node."""
     if node >= FIXED:
@@ -131,48 +100,26 @@ def _add_force(r: Array, node: int, x: float, y: float, z: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _add_bars(
-    q: Array, nodes: np.ndarray, bars: Array, w: float, before: Array, r: Array, K: Array, tangent: bool
-) -> float:
-    """Add all bars to r (and K); return their potential [J]."""
-    s = np.empty(6)
+def _add_bars(q: Array, nodes: np.ndarray, bars: Array, w: float, before: Array, r: Array) -> float:
+    """Add all bars to r; return their potential [J]."""
     energy = 0.0
     for b in range(bars.shape[0]):
         i, j = nodes[b, 0], nodes[b, 1]
         length, ex, ey, ez = bar.direction(q, i, j)
         T = bar.tension(length, w, before[b], bars, b)
-        if T == 0.0 and bars[b, bar.TENSION_ONLY] != 0.0:
-            continue
-        axial = bars[b, bar.STIFFNESS] + bars[b, bar.DAMPING] * w
-        energy += 0.5 * T * T / axial
+        energy += 0.5 * T * T / (bars[b, bar.STIFFNESS] + bars[b, bar.DAMPING] * w)
         _add_force(r, j, T * ex, T * ey, T * ez)
         _add_force(r, i, -T * ex, -T * ey, -T * ez)
-        if tangent:
-            _fill_line(s, axial, T / length, ex, ey, ez)
-            _add_pair(K, i, i, 1.0, s)
-            _add_pair(K, j, j, 1.0, s)
-            _add_pair(K, i, j, -1.0, s)
     return energy
 
 
 @njit(cache=True, error_model="numpy")
-def _add_segment(K: Array, nodes: np.ndarray, weights: Array, h: int, s: Array) -> None:
-    """Add the line matrix ``s`` between holes h and h + 1, spread on the six ring nodes that carry them."""
-    for a in range(6):
-        weight_a = weights[h + a // 3, a % 3] * (1.0 if a >= 3 else -1.0)
-        if weight_a != 0.0:
-            for b in range(a, 6):
-                weight_b = weights[h + b // 3, b % 3] * (1.0 if b >= 3 else -1.0)
-                if weight_b != 0.0:
-                    _add_pair(K, nodes[h + a // 3, a % 3], nodes[h + b // 3, b % 3], weight_a * weight_b, s)
-
-
-@njit(cache=True, error_model="numpy")
-def _add_cables(model: Model, q: Array, drive: Array, load: Load, ws: Workspace, tangent: bool) -> float:
-    """Add all cables to r (and K), fill G, tension, axial, length; return their potential [J]."""
-    cables, nodes, weights = model.cables, model.hole_nodes, model.hole_weights
-    sliding_cable.path_gradients(q, model.first_hole, nodes, weights, cables, ws.length, ws.G)
-    s = np.empty(6)
+def _add_cables(model: Model, q: Array, drive: Array, load: Load, ws: Workspace) -> float:
+    """Add all cables to r, fill G, tension, axial, length; return their potential [J]."""
+    cables = model.cables
+    sliding_cable.path_gradients(
+        q, model.first_hole, model.hole_nodes, model.hole_weights, cables, ws.length, ws.G
+    )
     energy = 0.0
     for c in range(cables.shape[0]):
         T = sliding_cable.tension(ws.length[c] + drive[c], load.w, load.cable_before[c], cables, c)
@@ -182,43 +129,30 @@ def _add_cables(model: Model, q: Array, drive: Array, load: Load, ws: Workspace,
         energy += 0.5 * T * T / axial
         for k in range(ws.r.shape[0]):
             ws.r[k] += T * ws.G[c, 3 * FIXED + k]
-        if tangent and T > 0.0:
-            for h in range(model.first_hole[c], model.first_hole[c + 1] - 1):
-                length, ex, ey, ez = sliding_cable.segment(q, nodes, weights, h)
-                _fill_line(s, 0.0, T / length, ex, ey, ez)
-                _add_segment(ws.K, nodes, weights, h, s)
     return energy
 
 
 @njit(cache=True, error_model="numpy")
-def _start(q: Array, mass: Array, inertia: float, nodal: Array, r: Array, K: Array, tangent: bool) -> float:
-    """Start r and K with inertia, virtual springs and external forces of (*); return their potential [J]."""
+def _start(q: Array, mass: Array, inertia: float, nodal: Array, r: Array) -> float:
+    """Start r with inertia, virtual springs and external forces of (*); return their potential [J]."""
     energy = 0.0
-    if tangent:
-        K[:] = 0.0
     for k in range(r.shape[0]):
-        i, a = k // 12, k % 12
-        first = 12 * (i + 1)
+        i, a, g = k // 12, k % 12, 12 + k
         force = 0.0
         if inertia != 0.0:
             for b in range(12):
-                force += mass[i, a, b] * (q[first + b] - nodal[Q_FREE, first + b])
-                if tangent:
-                    K[i, 0, a, b] += inertia * mass[i, a, b]
+                force += mass[i, a, b] * (q[g - a + b] - nodal[Q_FREE, g - a + b])
             force *= inertia
-            energy += 0.5 * force * (q[first + a] - nodal[Q_FREE, first + a])
-        g = first + a
+            energy += 0.5 * force * (q[g] - nodal[Q_FREE, g])
         spring = nodal[SPRING, g] * (q[g] - nodal[SPRING_AT, g])
         energy += 0.5 * spring * (q[g] - nodal[SPRING_AT, g]) - nodal[FORCE, g] * q[g]
         r[k] = force + spring - nodal[FORCE, g]
-        if tangent:
-            K[i, 0, a, a] += nodal[SPRING, g]
     return energy
 
 
 @njit(cache=True, error_model="numpy")
-def assemble(model: Model, q: Array, drive: Array, load: Load, ws: Workspace, tangent: bool) -> float:
-    """Fill ``ws`` with residual, cable gradients, tensions and (if ``tangent``) K at ``q``.
+def residual(model: Model, q: Array, drive: Array, load: Load, ws: Workspace) -> float:
+    """Fill ``ws`` with residual, cable gradients, lengths and tensions at ``q``.
 
     Args:
         model: Robot arrays.
@@ -226,11 +160,29 @@ def assemble(model: Model, q: Array, drive: Array, load: Load, ws: Workspace, ta
         drive: Drive lengths d (m,) [m].
         load: Integration rule, virtual springs and external forces.
         ws: Output arrays.
-        tangent: Whether K is wanted.
 
     Returns:
         The incremental potential [J] whose gradient is r.
     """
-    energy = _start(q, model.mass, load.inertia, load.nodal, ws.r, ws.K, tangent)
-    energy += _add_bars(q, model.bar_nodes, model.bars, load.w, load.bar_before, ws.r, ws.K, tangent)
-    return energy + _add_cables(model, q, drive, load, ws, tangent)
+    energy = _start(q, model.mass, load.inertia, load.nodal, ws.r)
+    energy += _add_bars(q, model.bar_nodes, model.bars, load.w, load.bar_before, ws.r)
+    return energy + _add_cables(model, q, drive, load, ws)
+
+
+@njit(cache=True, error_model="numpy")
+def fill_tangent(model: Model, q: Array, load: Load, ws: Workspace) -> None:
+    """Fill ``ws.K`` at ``q``, where :func:`residual` has been evaluated last."""
+    tangent.start(ws.K, model.mass, load.inertia, load.nodal[SPRING])
+    tangent.add_bars(ws.K, q, model.bar_nodes, model.bars, load.w, load.bar_before)
+    tangent.add_cables(ws.K, q, model.first_hole, model.hole_nodes, model.hole_weights, ws.tension)
+
+
+@njit(cache=True, error_model="numpy")
+def assemble(
+    model: Model, q: Array, drive: Array, load: Load, ws: Workspace, with_tangent: bool | np.bool_
+) -> float:
+    """Evaluate :func:`residual` and, if wanted, :func:`fill_tangent`; returns the potential [J]."""
+    energy = residual(model, q, drive, load, ws)
+    if with_tangent:
+        fill_tangent(model, q, load, ws)
+    return energy

@@ -6,8 +6,9 @@ twin that a simulated plant uses.
 
 from __future__ import annotations
 
+import itertools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,19 +133,18 @@ def _bandwidth(bars: NDArray[np.int64], hole_nodes: NDArray[np.int64], first: ND
     rings = hole_nodes[:, 0] // FIXED
     for c in range(first.shape[0] - 1):
         path = rings[first[c] : first[c + 1]]
-        widths += [abs(int(b) - int(a)) for a, b in zip(path[:-1], path[1:], strict=True) if a > 0 and b > 0]
+        widths += [abs(int(b) - int(a)) for a, b in itertools.pairwise(path) if a > 0 and b > 0]
     return max(widths)
 
 
 def freeze(model: Model) -> Model:
     """Copy of ``model`` with every array read-only, so that all kernels see one type."""
-    frozen = []
-    for value in model:
+    fields: dict[str, Any] = model._asdict()
+    for name, value in fields.items():
         if isinstance(value, np.ndarray):
-            value = value.copy()
-            value.flags.writeable = False
-        frozen.append(value)
-    return Model(*frozen)
+            fields[name] = value.copy()
+            fields[name].flags.writeable = False
+    return Model(**fields)
 
 
 def undeformed(d: RobotDescription) -> Array:

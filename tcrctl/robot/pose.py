@@ -33,7 +33,9 @@ def _area_vector(q: Array, ring: int) -> Array:
 def normal(q: Array, ring: int) -> Array:
     """Unit normal (3,) of the ring, +z at rest (REFERENCES.md, correction 6)."""
     d = _area_vector(q, ring)
-    return d / np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    size = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    n: Array = d / size
+    return n
 
 
 @njit(cache=True, error_model="numpy")
@@ -51,7 +53,7 @@ def twist(q: Array, ring: int) -> float:
         i, j = (a + 1) % 3, (a + 2) % 3
         along += ahead[a] * arm[a]
         across += n[a] * (ahead[i] * arm[j] - ahead[j] * arm[i])
-    return np.arctan2(across, along)
+    return float(np.arctan2(across, along))
 
 
 @njit(cache=True, error_model="numpy")

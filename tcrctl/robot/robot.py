@@ -108,7 +108,7 @@ def build_robot(description: RobotDescription) -> Robot:
 
 
 def mismatched(robot: Robot, springs: float = 1.0, cables: float = 1.0, density: float = 1.0) -> Robot:
-    """The same robot built of other material: factors on moduli and masses, same rest lengths, own rest shape.
+    """The same robot of other material: factors on moduli and masses, same rest lengths, own rest shape.
 
     Raises:
         NoEquilibriumError: If that robot has no stable shape at zero drive.
