@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import hypothesis
 import pytest
 
 if TYPE_CHECKING:
@@ -17,6 +18,11 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[1]
 #: Compiled kernels of former states of the sources are removed after a week.
 KEPT_S = 7 * 86400.0
+
+
+#: The first example may compile kernels, so no deadline; the same examples every time.
+hypothesis.settings.register_profile("tcrctl", deadline=None, derandomize=True, print_blob=True)
+hypothesis.settings.load_profile("tcrctl")
 
 
 def kernel_key() -> str:
