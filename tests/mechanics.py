@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from tcrctl.elements import bar, sliding_cable
@@ -13,7 +15,6 @@ from tcrctl.robot.model import FIXED, Model, freeze
 from tcrctl.robot.robot import build_robot
 
 FREE = 3 * FIXED
-ANGLES_TCR5X4 = (0, 90, 180, 270)
 
 
 def altered(name, *overrides):
@@ -59,21 +60,35 @@ def rule_load(model, rng, q, inertia=0.0, w=0.0, springs=0.0):
     return Load(inertia, w, nodal, bar_before, cable_before)
 
 
-def deformed(robot, seed, bend=0.5, noise=3e-4):
-    """The robot at rest, bent by a few degrees per module, sheared and shaken [m]."""
+def turned(vector):
+    """Rotation matrix of the rotation vector (3,) [rad] (Rodrigues)."""
+    angle = np.linalg.norm(vector)
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * S + (1.0 - np.cos(angle)) * S @ S
+
+
+def deformed(robot, seed, bend=0.1, noise=2e-5):
+    """The robot at rest, every module turned against the one above it, then all nodes shaken [m]."""
     rng = np.random.default_rng(seed)
-    nodes = robot.rest.q.reshape(-1, 3).copy()
-    z = -nodes[:, 2]
-    for axis in range(2):
-        nodes[:, axis] += rng.uniform(-bend, bend) * z**2 + rng.uniform(-bend, bend) * z**3
-    nodes[FIXED:] += noise * rng.standard_normal(nodes[FIXED:].shape)
+    modules = robot.rest.q.reshape(-1, FIXED, 3)
+    frame, centre, out = np.eye(3), np.zeros(3), [modules[0]]
+    for above, below in itertools.pairwise(modules):
+        frame = frame @ turned(bend * rng.uniform(-1.0, 1.0, 3) * [1.0, 1.0, 0.3])
+        step = below[:3].mean(axis=0) - above[:3].mean(axis=0)
+        centre = centre + frame @ step
+        out.append(centre + (below - below[:3].mean(axis=0)) @ frame.T)
+    nodes = np.array(out)
+    nodes[1:] += noise * rng.standard_normal(nodes[1:].shape)
     return nodes.ravel()
 
 
-def some_drives(robot, seed, size=0.01):
-    """Drive lengths within ``size`` [m], one of which makes its cable slack."""
-    drive = np.random.default_rng([seed, 1]).uniform(-size, size, robot.n_cables)
-    drive[seed % robot.n_cables] = -0.05
+def some_drives(robot, seed):
+    """Drive lengths [m]: cables pulled by up to 20 mm, one of them paid out until it is slack."""
+    drive = np.random.default_rng([seed, 1]).uniform(0.01, 0.03, robot.n_cables)
+    drive[seed % robot.n_cables] = -0.1
     return drive
 
 

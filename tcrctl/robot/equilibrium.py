@@ -24,7 +24,7 @@ MAX_ITERATIONS = 80
 LOAD_STEPS = (4, 16, 64)
 #: Stiffness of the nearly constant-force cables that stand for prescribed tensions [N/m].
 SOFT_CABLE = 1.0
-TENSION_PASSES = 8
+TENSION_PASSES = 50
 TENSION_TOLERANCE = 1e-9
 
 
