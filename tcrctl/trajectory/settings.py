@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, TypeAlias, TypeVar
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from ..settings import Settings, quantity
+from .pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
+from .values import NotNegative, Positive, Vector, check_one_of, not_empty
 
 JOIN_TOLERANCE_MM = 1e-6
 AXIS_TOLERANCE = 1e-3  # axes typed with four decimals pass; the builder makes them exactly orthonormal
 
-Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
-NotNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
 Point: TypeAlias = tuple[float, float]
-Vector: TypeAlias = tuple[float, float, float]
-_Item = TypeVar("_Item")
 
 
 def _checked_line(line: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -26,19 +24,6 @@ def _checked_line(line: tuple[Point, ...]) -> tuple[Point, ...]:
         if math.dist(line[i - 1], line[i]) <= JOIN_TOLERANCE_MM:
             raise ValueError(f"points {i} and {i + 1} are the same: ({line[i][0]:g}, {line[i][1]:g}) mm")
     return line
-
-
-def _not_empty(items: tuple[_Item, ...]) -> tuple[_Item, ...]:
-    # not min_length: that also complains when an item has an error of its own
-    if not items:
-        raise ValueError("needs at least 1 item, it has none")
-    return items
-
-
-def _check_one_of(shapes: dict[str, object]) -> None:
-    given = [name for name, shape in shapes.items() if shape is not None]
-    if len(given) != 1:
-        raise ValueError(f"give exactly one of {', '.join(shapes)}; given: {', '.join(given) or 'none'}")
 
 
 Polyline: TypeAlias = Annotated[tuple[Point, ...], AfterValidator(_checked_line)]
@@ -75,7 +60,7 @@ class SegmentSettings(Settings):
 
     @model_validator(mode="after")
     def _one_shape(self) -> SegmentSettings:
-        _check_one_of({"line": self.line, "arc": self.arc})
+        check_one_of({"line": self.line, "arc": self.arc})
         return self
 
     @property
@@ -92,7 +77,7 @@ class StrokeSettings(Settings):
 
     line: Polyline | None = quantity("mm", "corner points of a polyline, two or more", None)
     arc: ArcSettings | None = Field(default=None, description="circular arc")
-    path: Annotated[tuple[SegmentSettings, ...], AfterValidator(_not_empty)] | None = Field(
+    path: Annotated[tuple[SegmentSettings, ...], AfterValidator(not_empty)] | None = Field(
         default=None, description="lines and arcs one after the other; each begins where the last one ends"
     )
 
@@ -111,7 +96,7 @@ class StrokeSettings(Settings):
 
     @model_validator(mode="after")
     def _one_shape(self) -> StrokeSettings:
-        _check_one_of({"line": self.line, "arc": self.arc, "path": self.path})
+        check_one_of({"line": self.line, "arc": self.arc, "path": self.path})
         return self
 
     @property
@@ -145,7 +130,7 @@ class StrokesSettings(Settings):
 
     kind: Literal["strokes"]
     plane: PlaneSettings = Field(default_factory=PlaneSettings, description="where the drawing lies")
-    strokes: Annotated[tuple[StrokeSettings, ...], AfterValidator(_not_empty)] = Field(
+    strokes: Annotated[tuple[StrokeSettings, ...], AfterValidator(not_empty)] = Field(
         description="strokes in drawing order, at least one"
     )
     speed_limit_mm_s: Positive = quantity("mm/s", "peak speed while drawing", 20.0)
@@ -180,4 +165,7 @@ class HoldSettings(Settings):
     )
 
 
-TrajectorySettings: TypeAlias = Annotated[StrokesSettings | HoldSettings, Field(discriminator="kind")]
+TrajectorySettings: TypeAlias = Annotated[
+    StrokesSettings | HoldSettings | WaypointsSettings | RevolutionSettings | ScanSettings,
+    Field(discriminator="kind"),
+]

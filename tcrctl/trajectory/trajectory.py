@@ -9,8 +9,11 @@ import numpy as np
 
 from ..signals import Array, Reference
 from .hold import build_hold
+from .revolution import build_revolution
+from .scan import build_scan
 from .settings import TrajectorySettings
 from .strokes import build_strokes
+from .waypoints import build_waypoints
 
 
 class Trajectory(Protocol):
@@ -34,6 +37,9 @@ class Trajectory(Protocol):
 BUILDERS: Mapping[str, Callable[[Any, Array, Array], Trajectory]] = {
     "strokes": build_strokes,
     "hold": build_hold,
+    "waypoints": build_waypoints,
+    "revolution": build_revolution,
+    "scan": build_scan,
 }
 
 

@@ -1,0 +1,49 @@
+"""``kind: revolution``: turning about a vertical axis, as Exp_1 to Exp_3 of [TCR, Sec. V.D]."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..signals import Array
+from .pose_path import MM, EndPose, PosePath, Revolution, StraightMove, blend, radians, rest, turn
+from .pose_settings import RevolutionSettings
+
+
+def build_revolution(settings: RevolutionSettings, rest_position: Array, rest_normal: Array) -> PosePath:
+    """Plan a revolution.
+
+    Args:
+        settings: The revolution.
+        rest_position: End position of the robot at rest (3,) [m]; the path starts there.
+        rest_normal: End normal at rest (3,).
+    """
+    curve = revolution(settings, rest_position)
+    home, first, last = EndPose(rest_position, rest_normal), curve.pose(0.0), curve.pose(1.0)
+    turning = abs(settings.turns) * settings.turn_s + settings.ramp_s
+    moves = [
+        rest(settings.lead_in_s),
+        blend(StraightMove(home, first), settings.blend_in_s),
+        rest(settings.dwell_s),
+        turn(curve, turning, settings.ramp_s),
+        rest(settings.dwell_s),
+    ]
+    if settings.blend_out_s > 0.0:
+        moves.append(blend(StraightMove(last, home), settings.blend_out_s))
+    return PosePath.of([*moves, rest(settings.settle_s)])
+
+
+def revolution(settings: RevolutionSettings, rest_position: Array) -> Revolution:
+    """Return the curve about the vertical axis."""
+    start = math.radians(settings.start_deg)
+    side = 1.0 if settings.lean == "outward" else -1.0
+    tilt = radians(settings.tilt_deg)
+    return Revolution(
+        centre=rest_position + MM * np.array(settings.offset_mm),
+        frame=np.eye(3),
+        angle=(start, start + 2.0 * math.pi * settings.turns),
+        radius=(MM * settings.radius_mm[0], MM * settings.radius_mm[1]),
+        height=(MM * settings.height_mm[0], MM * settings.height_mm[1]),
+        tilt=(side * tilt[0], side * tilt[1]),
+    )
