@@ -123,7 +123,7 @@ def try_step(
     return outcome
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def advance(
     model: Model,
     x: State,
