@@ -95,7 +95,9 @@ class Memory(NamedTuple):
 def _follow(model: Model, load: Load, ws: Workspace, memory: Memory, drive: Array) -> Outcome:
     """Move the model's equilibrium to ``drive``, starting where its static gain points to."""
     q = memory.equilibrium.copy()
-    q[3 * FIXED :] += np.dot(memory.gain, drive - memory.drive)
+    for k in range(memory.gain.shape[0]):
+        for c in range(drive.shape[0]):
+            q[3 * FIXED + k] += memory.gain[k, c] * (drive[c] - memory.drive[c])
     outcome = minimise(model, q, drive, load, ws, TOLERANCE, int(MAX_ITERATIONS), bool(1))
     if outcome.converged:
         memory.equilibrium[:], memory.drive[:] = q, drive
@@ -158,14 +160,19 @@ def forecast(
         Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m).
     """  # fmt: skip
     outcome = _follow(model, load, ws, memory, drive)
-    deviation = q - memory.equilibrium
-    if outcome.converged and blend > 0.0 and np.all(np.isfinite(deviation)) and np.all(np.isfinite(v)):
+    deviation, away, finite = np.empty(q.shape[0]), np.empty(q.shape[0]), True
+    for k in range(q.shape[0]):
+        deviation[k] = q[k] - memory.equilibrium[k]
+        finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
+    if outcome.converged and blend > 0.0 and finite:
         _update_offset(model, ws, memory, deviation, v, period, blend)
-    memory.v[:] = v
+    for k in range(q.shape[0]):
+        memory.v[k] = v[k]
+        away[k] = deviation[k] - memory.offset[k]
     change, stable = response.respond(
         model,
         memory.equilibrium,
-        deviation - memory.offset,
+        away,
         v,
         ahead[0],
         ahead.shape[0],
