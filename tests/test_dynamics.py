@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+import time
+
 import mechanics
 import numpy as np
 import pytest
@@ -230,6 +233,24 @@ def test_cables_only_pull(tcr700):
         assert motion.work.tension.min() >= 0.0
     assert (motion.work.tension == 0.0).sum() >= 2
     assert motion.work.tension.max() > 1.0
+
+
+def test_other_threads_run_while_the_plant_advances(tcr700):
+    motion, ticks, done = Motion(tcr700), [], threading.Event()
+    motion.advance(speeds(tcr700), 0.001)  # compiled or loaded now
+
+    def tick():
+        while not done.wait(0.001):
+            ticks.append(time.perf_counter())
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    begin = time.perf_counter()
+    motion.advance(speeds(tcr700), 0.3, 1e-4)
+    end = time.perf_counter()
+    done.set()
+    thread.join()
+    assert sum(begin < t < end for t in ticks) > 5
 
 
 def step_of_the_bordered_system(robot, x, speed, h):
