@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 
 from tcrctl.errors import DivergenceError
@@ -30,6 +32,8 @@ class SimulatedPlant:
         self.robot, self.period, self.time = robot, period, 0.0
         self._step, self._rho = settings.step_ms / 1000.0, settings.spectral_radius
         self._latency, self._noise = settings.latency_ms / 1000.0, settings.noise_um * 1e-6
+        whole = int(self._latency / period + 1e-9)  # periods; what is left of the latency is within one
+        self._late = max(0.0, self._latency - whole * period)
         self._random = np.random.default_rng(seed)
         self._state = dynamics.rest_state(robot.rest.q, np.zeros(robot.n_cables))
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
@@ -37,11 +41,13 @@ class SimulatedPlant:
         self._rows = np.array(ring_rows(robot.n_modules))
         rings = range(1, robot.n_modules + 1) if settings.measured_rings == "all" else settings.measured_rings
         self._valid = np.isin(self._rows // FIXED, list(rings))
-        self._delayed = self._state.q.copy()
+        self._seen = deque(
+            [self._state.q.copy()], maxlen=whole + 1
+        )  # oldest first: shapes as cameras saw them
 
     def read(self) -> Measurement:
         """Ring nodes as they were one latency ago, with noise, in single precision; drives as they are."""
-        nodes = self._delayed.reshape(-1, 3)[self._rows]
+        nodes = self._seen[0].reshape(-1, 3)[self._rows]
         nodes = nodes + self._noise * self._random.standard_normal(nodes.shape)
         return Measurement(
             t=self.time - min(self._latency, self.time),
@@ -60,10 +66,9 @@ class SimulatedPlant:
         before = self._state.drive
         drive = np.clip(before + self.period * command.speed, low, high)
         applied = Command((drive - before) / self.period, drive)
-        late = min(self._latency, self.period)
-        self._advance(applied.speed, self.period - late)
-        self._delayed = self._state.q.copy()
-        self._advance(applied.speed, late)
+        self._advance(applied.speed, self.period - self._late)
+        self._seen.append(self._state.q.copy())
+        self._advance(applied.speed, self._late)
         self.time += self.period
         self._state.drive[:] = drive  # the sum of many sub-steps differs from it by rounding
         return applied
