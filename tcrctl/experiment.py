@@ -10,10 +10,11 @@ import numpy as np
 
 from tcrctl.compilation import announced_compilation
 from tcrctl.controller.controller import Controller, build_controller
+from tcrctl.controller.settings import IocSettings, OpenLoopSettings
 from tcrctl.errors import InputError
 from tcrctl.estimator.estimator import Estimator, build_estimator
 from tcrctl.estimator.exact import State
-from tcrctl.feasibility import DriveLimits, StaticPath, check_feasibility
+from tcrctl.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.loop import run_loop, step_count
 from tcrctl.metrics import Metrics
 from tcrctl.pacing import Unpaced
@@ -119,8 +120,9 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
     spec = loaded.spec.model_copy(update=changes)
     with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
         robot = build_robot(loaded.robot)
-        trajectory = build_trajectory(spec.trajectory, robot.rest_position, robot.rest_normal)
-        if spec.controller.output == "pose" and trajectory.normal(np.zeros(1)) is None:
+        trajectory = build_trajectory(spec.trajectory, robot)
+        wants_pose = isinstance(spec.controller, IocSettings) and spec.controller.output == "pose"
+        if wants_pose and trajectory.normal(np.zeros(1)) is None:
             raise InputError(
                 f"{loaded.path}: controller.output: pose needs a trajectory with an orientation; "
                 f"trajectory.kind: {spec.trajectory.kind} leaves it free"
@@ -131,19 +133,21 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
 
 
 def plan(experiment: Experiment) -> StaticPath:
-    """Find the drives along the trajectory, held against all limits.
+    """Find the drives along the trajectory, or take those that it gives, held against all limits.
 
     Raises:
         InfeasibleError: If the robot cannot follow.
     """
     robot, controller = experiment.robot, experiment.spec.controller
-    tension = controller.tension
+    tension = controller.tension if isinstance(controller, IocSettings) else None
     limits = DriveLimits(
         speed=controller.speed_limit_mm_s * 1e-3,
         floor=0.0 if tension is None else tension.floor_n,
         ceiling=robot.tension_limit if tension is None else tension.ceiling_n,
         reference=float(np.mean(robot.rest.tension)) if tension is None else tension.reference_n,
     )
+    if isinstance(controller, OpenLoopSettings):
+        return check_drives(experiment.trajectory, robot, limits)
     return check_feasibility(experiment.trajectory, robot, limits)
 
 

@@ -21,7 +21,7 @@ from tcrctl.robot.equilibrium import Equilibrium, equilibrium
 from tcrctl.robot.model import FIXED
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
-from tcrctl.trajectory.trajectory import Trajectory
+from tcrctl.trajectory.trajectory import Trajectory, drives_of
 
 #: Time between samples [s]; Newton starts from the sample before.
 INTERVAL: Final = 0.25
@@ -119,6 +119,31 @@ def check_feasibility(trajectory: Trajectory, robot: Robot, limits: DriveLimits)
         held, path.error[i] = hold_pose(robot, target, held, limits)
         path.drive[i], path.tension[i] = held.drive, held.shape.tension
         _check_sample(path, i, target.size, robot, limits)
+    return path
+
+
+def check_drives(trajectory: Trajectory, robot: Robot, limits: DriveLimits) -> StaticPath:
+    """Hold the drive lengths that a trajectory gives against all limits.
+
+    Args:
+        trajectory: One that gives drive lengths.
+        robot: The robot that the controller knows.
+        limits: What drives and cables may do; the stroke is the robot's.
+
+    Raises:
+        InfeasibleError: If something breaks a limit, with the first time at which it does.
+        NoEquilibriumError: If the robot has no stable shape with some of the drives.
+    """
+    count, m = 1 + max(1, int(np.ceil(trajectory.duration / INTERVAL))), robot.n_cables
+    times = np.linspace(0.0, trajectory.duration, count)
+    drives = drives_of(trajectory, times)
+    assert drives is not None
+    path = StaticPath(times, drives, np.zeros((count, m)), np.zeros(count))
+    q, before = robot.rest.q, np.zeros(m)
+    for i, drive in enumerate(drives):
+        shape = equilibrium(robot.model, drive, robot.weight, q, before)
+        q, before, path.tension[i] = shape.q, drive, shape.tension
+        _check_sample(path, i, 6, robot, limits)
     return path
 
 

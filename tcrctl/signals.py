@@ -1,8 +1,8 @@
 """What flows round the loop: frozen records, SI units, world frame, time-stamped.
 
-    trajectory -> Reference --+
-    plant -> Measurement -> estimator -> Estimate -> controller -> Command -> plant
-                                          every record of one step -> StepRecord -> log
+trajectory -> Reference --+
+plant -> Measurement -> estimator -> Estimate -> controller -> Command -> plant
+                                      every record of one step -> StepRecord -> log
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ class Reference:
         normal: End normal wanted at ``t`` (3,), or None for position-only tracking.
         ahead_position: End positions wanted at the controller's prediction instants (n, 3) [m].
         ahead_normal: End normals wanted there (n, 3), or None.
+        drive: Drive lengths wanted at the first prediction instant (m,) [m]; None unless the trajectory gives them.
     """
 
     t: float
@@ -33,6 +34,7 @@ class Reference:
     normal: Array | None
     ahead_position: Array
     ahead_normal: Array | None
+    drive: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,16 +13,17 @@ from pathlib import Path
 from pydantic import Field, model_validator
 
 from tcrctl import shipped, strict_yaml
-from tcrctl.controller.settings import ControllerSettings
+from tcrctl.controller.settings import ControllerSettings, IocSettings
 from tcrctl.criterion import CriterionText
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
 from tcrctl.plant.settings import PlantSettings
-from tcrctl.robot.description import RobotDescription
+from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
 from tcrctl.settings import Path as Keys
 from tcrctl.settings import Settings, quantity, refuse
 from tcrctl.summary import TASK, UNITS
+from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.settings import TrajectorySettings
 
 
@@ -80,6 +81,11 @@ def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
         if criterion.name not in UNITS and not criterion.name.startswith(TASK):
             known = ", ".join(difflib.get_close_matches(criterion.name, UNITS, n=3, cutoff=0.3) or UNITS)
             yield ("criteria", i), f"a run has no result {criterion.name}; known: {known}, {TASK}..."
+    if spec.controller.kind == "open_loop" and spec.trajectory.kind != "drives":
+        yield (
+            ("trajectory", "kind"),
+            f"must be drives with controller.kind: open_loop, not {spec.trajectory.kind}",
+        )
     step, period = spec.plant.step_ms, spec.controller.period_s
     steps = period * 1e3 / step
     if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
@@ -101,10 +107,20 @@ def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Key
                 ("plant", "measured_rings", i),
                 f"there is no ring {ring}; {robot.name} has rings 1 to {count}",
             )
-    tension = spec.controller.tension
+    yield from _drive_misfits(spec.trajectory, robot)
+    tension = spec.controller.tension if isinstance(spec.controller, IocSettings) else None
     if tension is not None and tension.ceiling_n > robot.tension_limit_n:
         limit = f"tension_limit_n of {robot.name}, {robot.tension_limit_n:g}"
         yield ("controller", "tension", "ceiling_n"), f"must be at most {limit}, not {tension.ceiling_n:g}"
+
+
+def _drive_misfits(trajectory: TrajectorySettings, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+    legs = trajectory.legs if isinstance(trajectory, DrivesSettings) else ()
+    names = [route.name for route in cable_routes(robot)]
+    for i, leg in enumerate(legs):
+        if len(leg.drives_mm) != len(names):
+            has = f"{robot.name} has {len(names)} cables, {', '.join(names)}"
+            yield ("trajectory", "legs", i, "drives_mm"), f"{has}; there are {len(leg.drives_mm)} lengths"
 
 
 @dataclass(frozen=True, slots=True)

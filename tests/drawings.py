@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 from hypothesis import assume, settings
@@ -16,6 +17,7 @@ from tcrctl.trajectory.trajectory import build_trajectory
 
 REST = np.array([0.004, -0.003, -0.6])
 UP = np.array([0.0, 0.0, 1.0])
+AT_REST = SimpleNamespace(rest_position=REST, rest_normal=UP)
 DT = 0.005
 LETTERS = ["letter_i", "heart", "letter_d", "letter_u", "letter_t"]
 EXPERIMENTS = Path(__file__).parents[1] / "experiments"
@@ -37,7 +39,7 @@ def drawing(*strokes, **keys):
 
 
 def built(section):
-    return build_trajectory(section, REST, UP)
+    return build_trajectory(section, AT_REST)
 
 
 def at_start(x, y, **keys):

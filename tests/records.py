@@ -133,7 +133,7 @@ def steps(draw: st.DrawFn) -> StepRecord:
     def bools(length: int) -> np.ndarray:
         return np.array(draw(st.lists(st.booleans(), min_size=length, max_size=length)), np.bool_)
 
-    optional = draw(st.tuples(st.booleans(), st.booleans(), st.booleans()))
+    optional = draw(st.tuples(*[st.booleans()] * 4))
     return StepRecord(
         k=draw(st.integers(0, 2**32 - 1)),
         t=draw(_TIME),
@@ -144,6 +144,7 @@ def steps(draw: st.DrawFn) -> StepRecord:
             doubles(3) if optional[0] else None,
             vectors(h),
             vectors(h) if optional[1] else None,
+            doubles(m) if optional[3] else None,
         ),
         measurement=Measurement(
             draw(_NUMBER), draw(_bits(np.float32, 3 * p)).reshape(p, 3), bools(p), doubles(m)

@@ -79,9 +79,12 @@ def test_an_override_takes_part_in_every_check_and_is_remembered(tmp_path: Path)
         ),
         (
             ["controller.period_s=1"],
-            "/standing.yaml:4:1: controller.horizon_s: must be at least period_s, 1, not 0.4",
+            "/standing.yaml:4:1: controller.horizon_s: must be at least period_s, 1, not 0.8",
         ),
-        (["controller.blocks=9"], "--set controller.blocks: must be at most instants, 8, not 9"),
+        (
+            ["controller.instants=8", "controller.blocks=9"],
+            "--set controller.blocks: must be at most instants, 8, not 9",
+        ),
         (["controller.instants=61"], "--set controller.instants: must be <= 60, not 61"),
         (["controller.speed_limit_mm_s=0"], "--set controller.speed_limit_mm_s: must be > 0.0, not 0"),
         (
@@ -99,7 +102,7 @@ def test_an_override_takes_part_in_every_check_and_is_remembered(tmp_path: Path)
             ["controller.tension=no"],
             '--set controller.tension: must be off or a map of keys and values, not "no"',
         ),
-        (["controller.kind=open_lop"], "--set controller.kind: must be 'ioc'"),
+        (["controller.kind=open_lop"], "--set controller.kind: must be one of 'ioc', 'open_loop'"),
         (["estimator.kind=exakt"], "--set estimator.kind: must be one of 'passive_observer', 'exact'"),
         (["estimator.kind=exakt"], "did you mean exact?"),
         (

@@ -6,7 +6,8 @@ from typing import Protocol
 
 from tcrctl.controller.instantaneous import InstantaneousOptimalControl
 from tcrctl.controller.literal import LiteralIoc
-from tcrctl.controller.settings import ControllerSettings
+from tcrctl.controller.open_loop import OpenLoop
+from tcrctl.controller.settings import ControllerSettings, OpenLoopSettings
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
@@ -27,6 +28,8 @@ class Controller(Protocol):
 
 def build_controller(settings: ControllerSettings, robot: Robot) -> Controller:
     """Build the controller of a ``controller:`` section."""
+    if isinstance(settings, OpenLoopSettings):
+        return OpenLoop(settings, robot)
     if settings.prediction == "literal":
         return LiteralIoc(settings, robot)
     return InstantaneousOptimalControl(settings, robot)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -118,5 +118,13 @@ class IocSettings(Settings):
             yield ("weights", "normal"), "must be > 0 with output: pose, or the normal is not tracked"
 
 
-ControllerSettings: TypeAlias = IocSettings
+class OpenLoopSettings(Settings):
+    """Moves the drives to the lengths that the trajectory gives; nothing is fed back."""
+
+    kind: Literal["open_loop"]
+    period_s: float = quantity("s", "control period", 0.05, gt=0, le=10)
+    speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
+
+
+ControllerSettings: TypeAlias = Annotated[IocSettings | OpenLoopSettings, Field(discriminator="kind")]
 """Union of all kinds of controller, told apart by ``kind``."""

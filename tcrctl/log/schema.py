@@ -57,6 +57,7 @@ MESSAGES: Final[dict[str, tuple[Field, ...]]] = {
         Field("normal", "double[]", "1", optional=True),
         Field("ahead_position", "double[]", "m", width=3),
         Field("ahead_normal", "double[]", "1", width=3, optional=True),
+        Field("drive", "double[]", "m", optional=True),
     ),
     "Measurement": (
         Field("t", "double", "s"),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..robot.robot import Robot
 from ..signals import Array
 from .settings import HoldSettings
 
@@ -33,15 +34,14 @@ class HoldTrajectory:
         return None if self.target_normal is None else np.tile(self.target_normal, (t.size, 1))
 
 
-def build_hold(settings: HoldSettings, rest_position: Array, rest_normal: Array) -> HoldTrajectory:
+def build_hold(settings: HoldSettings, robot: Robot) -> HoldTrajectory:
     """Build a constant target.
 
     Args:
         settings: Duration, offset and whether the orientation counts.
-        rest_position: End position of the robot at rest (3,) [m].
-        rest_normal: End normal at rest (3,).
+        robot: The robot whose rest pose is meant.
     """
-    target = rest_position + 1e-3 * np.array(settings.offset_mm)
+    target = robot.rest_position + 1e-3 * np.array(settings.offset_mm)
     return HoldTrajectory(
-        settings.duration_s, target, rest_normal.copy() if settings.orientation == "rest" else None
+        settings.duration_s, target, robot.rest_normal if settings.orientation == "rest" else None
     )

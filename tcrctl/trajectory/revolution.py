@@ -6,21 +6,22 @@ import math
 
 import numpy as np
 
+from ..robot.robot import Robot
 from ..signals import Array
 from .pose_path import MM, EndPose, PosePath, Revolution, StraightMove, blend, radians, rest, turn
 from .pose_settings import RevolutionSettings
 
 
-def build_revolution(settings: RevolutionSettings, rest_position: Array, rest_normal: Array) -> PosePath:
+def build_revolution(settings: RevolutionSettings, robot: Robot) -> PosePath:
     """Plan a revolution.
 
     Args:
         settings: The revolution.
-        rest_position: End position of the robot at rest (3,) [m]; the path starts there.
-        rest_normal: End normal at rest (3,).
+        robot: The path starts at its rest pose.
     """
-    curve = revolution(settings, rest_position)
-    home, first, last = EndPose(rest_position, rest_normal), curve.pose(0.0), curve.pose(1.0)
+    curve = revolution(settings, robot.rest_position)
+    home = EndPose(robot.rest_position, robot.rest_normal)
+    first, last = curve.pose(0.0), curve.pose(1.0)
     turning = abs(settings.turns) * settings.turn_s + settings.ramp_s
     moves = [
         rest(settings.lead_in_s),

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..numerics import rotation
+from ..robot.robot import Robot
 from ..signals import Array
 from .pose_path import EndPose, PosePath, Revolution, StraightMove, blend, rest, turn, unit
 from .pose_settings import ScanSettings
@@ -16,16 +17,15 @@ UP = np.array([0.0, 0.0, 1.0])
 STEEP = 1e-6  # sine of the angle to the vertical below which "straight up" says nothing
 
 
-def build_scan(settings: ScanSettings, rest_position: Array, rest_normal: Array) -> PosePath:
+def build_scan(settings: ScanSettings, robot: Robot) -> PosePath:
     """Plan a scan.
 
     Args:
         settings: The hole and the four stages.
-        rest_position: End position of the robot at rest (3,) [m]; the first stage starts there.
-        rest_normal: End normal at rest (3,).
+        robot: The path starts at its rest pose.
     """
-    curve = sweep(settings, rest_position)
-    home = EndPose(rest_position, rest_normal)
+    curve = sweep(settings, robot.rest_position)
+    home = EndPose(robot.rest_position, robot.rest_normal)
     at_hole = EndPose(curve.centre, curve.frame[2])
     aside = curve.pose(0.0)
     return PosePath.of(

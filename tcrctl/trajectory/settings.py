@@ -8,6 +8,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from ..settings import Settings, quantity
+from .drive_settings import DrivesSettings
 from .pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
 from .values import NotNegative, Positive, Vector, check_one_of, not_empty
 
@@ -166,6 +167,6 @@ class HoldSettings(Settings):
 
 
 TrajectorySettings: TypeAlias = Annotated[
-    StrokesSettings | HoldSettings | WaypointsSettings | RevolutionSettings | ScanSettings,
+    StrokesSettings | HoldSettings | WaypointsSettings | RevolutionSettings | ScanSettings | DrivesSettings,
     Field(discriminator="kind"),
 ]

@@ -6,7 +6,7 @@ import numpy as np
 
 from tcrctl.numerics import rotation
 from tcrctl.signals import Array
-from tcrctl.trajectory.trajectory import Trajectory
+from tcrctl.trajectory.trajectory import Trajectory, drives_of
 
 
 def fade_out(x: Array) -> Array:
@@ -57,6 +57,10 @@ class StartBlend:
         """Return unit end normals at times t (n,) [s] as (n, 3), or None if the orientation is free."""
         wanted = self._trajectory.normal(t)
         return None if wanted is None else _turned(wanted, self._left(t)[:, None] * self._turn)
+
+    def drive(self, t: Array) -> Array | None:
+        """Return the trajectory's drive lengths at times t (n,) [s] as (n, m) [m], or None; no offset on them."""
+        return drives_of(self._trajectory, t)
 
     def _left(self, t: Array) -> Array:
         """Part of the offset that is left at times t (n,)."""

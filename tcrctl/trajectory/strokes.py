@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..robot.robot import Robot
 from ..signals import Array
 from .corner import rounded, split_at_corners
 from .plane_curve import MM, PlanePiece, stroke_pieces
@@ -59,19 +60,17 @@ class Move:
     phases: list[Phase]
 
 
-def build_strokes(settings: StrokesSettings, rest_position: Array, rest_normal: Array) -> StrokesTrajectory:
+def build_strokes(settings: StrokesSettings, robot: Robot) -> StrokesTrajectory:
     """Plan a drawing.
 
     Args:
         settings: The drawing and its limits.
-        rest_position: End position of the robot at rest (3,) [m]; the approach starts there.
-        rest_normal: End normal at rest (3,); not used, the orientation is free.
+        robot: The approach starts at its rest position.
 
     Returns:
         The trajectory; it ends at the end of the last stroke.
     """
-    del rest_normal
-    plan = list(moves(settings, rest_position))
+    plan = list(moves(settings, robot.rest_position))
     return StrokesTrajectory(
         SpacePath.of([piece for move in plan for piece in move.pieces]),
         TimeLaw.of([phase for move in plan for phase in move.phases]),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from ..robot.robot import Robot
 from ..signals import Array, Reference
+from .drives import build_drives
 from .hold import build_hold
 from .revolution import build_revolution
 from .scan import build_scan
@@ -33,25 +35,37 @@ class Trajectory(Protocol):
         ...
 
 
+@runtime_checkable
+class Driven(Protocol):
+    """What a trajectory offers that gives drive lengths beside the end pose that goes with them."""
+
+    def drive(self, t: Array) -> Array | None:
+        """Return drive lengths at times t (n,) [s] as (n, m) [m], or None if it gives none."""
+        ...
+
+
 # the settings type of each builder belongs to its key; TrajectorySettings has checked that pairing
-BUILDERS: Mapping[str, Callable[[Any, Array, Array], Trajectory]] = {
+BUILDERS: Mapping[str, Callable[[Any, Robot], Trajectory]] = {
     "strokes": build_strokes,
     "hold": build_hold,
     "waypoints": build_waypoints,
     "revolution": build_revolution,
     "scan": build_scan,
+    "drives": build_drives,
 }
 
 
-def build_trajectory(settings: TrajectorySettings, rest_position: Array, rest_normal: Array) -> Trajectory:
+def build_trajectory(settings: TrajectorySettings, robot: Robot) -> Trajectory:
     """Build the trajectory that a ``trajectory:`` section describes.
 
     Args:
         settings: The checked section.
-        rest_position: End position of the robot at rest (3,) [m].
-        rest_normal: End normal of the robot at rest (3,).
+        robot: The robot that the controller knows; paths start at its rest pose.
+
+    Raises:
+        NoEquilibriumError: If drive lengths are given with which the robot has no stable shape.
     """
-    return BUILDERS[settings.kind](settings, rest_position, rest_normal)
+    return BUILDERS[settings.kind](settings, robot)
 
 
 def sample_reference(trajectory: Trajectory, t: float, ahead_t: Array) -> Reference:
@@ -67,6 +81,17 @@ def sample_reference(trajectory: Trajectory, t: float, ahead_t: Array) -> Refere
     """
     times = np.concatenate(([t], ahead_t))
     position, normal = trajectory.position(times), trajectory.normal(times)
-    if normal is None:
-        return Reference(t, position[0], None, position[1:], None)
-    return Reference(t, position[0], normal[0], position[1:], normal[1:])
+    drives = drives_of(trajectory, times[1:2])
+    return Reference(
+        t=t,
+        position=position[0],
+        normal=None if normal is None else normal[0],
+        ahead_position=position[1:],
+        ahead_normal=None if normal is None else normal[1:],
+        drive=None if drives is None else drives[0],
+    )
+
+
+def drives_of(trajectory: Trajectory, t: Array) -> Array | None:
+    """Return drive lengths at times t (n,) [s] as (n, m) [m], or None if the trajectory gives none."""
+    return trajectory.drive(t) if isinstance(trajectory, Driven) else None

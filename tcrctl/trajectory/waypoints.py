@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..numerics import rotation
+from ..robot.robot import Robot
 from ..signals import Array
 from .pose_path import MM, EndPose, PoseMove, PosePath, StraightMove, rest, unit
 from .pose_settings import PlaceSettings, WaypointSettings, WaypointsSettings
@@ -17,16 +18,15 @@ from .speed_plan import MotionLimits, Zone, rest_to_rest
 QUICK = 1e6  # limit of a leg that goes nowhere; it takes two ramps
 
 
-def build_waypoints(settings: WaypointsSettings, rest_position: Array, rest_normal: Array) -> PosePath:
+def build_waypoints(settings: WaypointsSettings, robot: Robot) -> PosePath:
     """Plan the legs.
 
     Args:
         settings: The waypoints and the limits.
-        rest_position: End position of the robot at rest (3,) [m]; the first leg starts there.
-        rest_normal: End normal at rest (3,).
+        robot: The path starts at its rest pose.
     """
     oriented = settings.points[0].oriented
-    home = EndPose(rest_position, rest_normal if oriented else None)
+    home = EndPose(robot.rest_position, robot.rest_normal if oriented else None)
     return PosePath.of(list(legs(settings, home)))
 
 

@@ -1,0 +1,47 @@
+"""``kind: open_loop``: moves the drives to the lengths that the trajectory gives, whatever the end does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcrctl.controller.settings import OpenLoopSettings
+from tcrctl.errors import InputError
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
+
+
+class OpenLoop:
+    """Follows given drive lengths.
+
+    Attributes:
+        ahead: The end of the coming period (1,) [s].
+    """
+
+    ahead: Array
+
+    def __init__(self, settings: OpenLoopSettings, robot: Robot) -> None:
+        self._period, self._limit = settings.period_s, settings.speed_limit_mm_s / 1000.0
+        self._stroke = robot.stroke
+        self.ahead = np.array([settings.period_s])
+
+    def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
+        """Command that brings the drives to their lengths by the end of the period, within the limits.
+
+        Raises:
+            InputError: If the trajectory gives no drive lengths.
+        """
+        if reference.drive is None:
+            raise InputError("controller.kind: open_loop needs trajectory.kind: drives")
+        wanted = (np.clip(reference.drive, *self._stroke) - estimate.drive) / self._period
+        speed = np.clip(wanted, -self._limit, self._limit)
+        info = ControlInfo(
+            converged=True,
+            iterations=0,
+            residual=0.0,
+            lcp_residual=0.0,
+            lcp_pivots=0,
+            saturated=np.abs(wanted) > self._limit * (1.0 + 1e-9),
+            predicted_tension=estimate.tension,
+            integral=np.zeros(6),
+        )
+        return Command(speed, estimate.drive + self._period * speed), info
