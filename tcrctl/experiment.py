@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -11,7 +12,7 @@ import numpy as np
 from tcrctl.compilation import announced_compilation
 from tcrctl.controller.controller import Controller, build_controller
 from tcrctl.controller.settings import IocSettings, OpenLoopSettings
-from tcrctl.errors import InputError
+from tcrctl.errors import InputError, StoppedError
 from tcrctl.estimator.estimator import Estimator, build_estimator
 from tcrctl.estimator.exact import State
 from tcrctl.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
@@ -19,6 +20,7 @@ from tcrctl.loop import run_loop, step_count
 from tcrctl.metrics import Metrics
 from tcrctl.pacing import Unpaced
 from tcrctl.plant.plant import Plant
+from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
 from tcrctl.robot.model import FIXED
@@ -144,33 +146,41 @@ def plan(experiment: Experiment) -> StaticPath:
         speed=controller.speed_limit_mm_s * 1e-3,
         floor=0.0 if tension is None else tension.floor_n,
         ceiling=robot.tension_limit if tension is None else tension.ceiling_n,
-        reference=float(np.mean(robot.rest.tension)) if tension is None else tension.reference_n,
     )
     if isinstance(controller, OpenLoopSettings):
         return check_drives(experiment.trajectory, robot, limits)
     return check_feasibility(experiment.trajectory, robot, limits)
 
 
-def build_parts(experiment: Experiment) -> Parts:
-    """Build plant, estimator and controller, and let the trajectory begin where the plant is.
+def build_plant(experiment: Experiment) -> tuple[Plant, State | None]:
+    """Build the plant; returns its true state too if it knows it.
 
     Raises:
-        DeviceError: If the plant cannot be reached.
+        DeviceError: If it cannot be reached.
     """
-    spec, robot, period = experiment.spec, experiment.robot, experiment.period
-    plant, state = PLANTS[spec.plant.kind](experiment)
+    return PLANTS[experiment.spec.plant.kind](experiment)
+
+
+def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> Parts:
+    """Build estimator and controller for a plant at rest, and let the trajectory begin where the plant is.
+
+    Args:
+        experiment: The experiment.
+        plant: Is measured, not driven.
+        state: Its true positions and velocities if it knows them.
+
+    Raises:
+        InputError: If the estimator needs a state that is not known.
+        DeviceError: If the plant cannot be measured.
+    """
+    spec, robot = experiment.spec, experiment.robot
     trajectory, offset = experiment.trajectory, np.nan
     found = measured_pose(plant, robot)
     if found is not None:
         offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))
         trajectory = StartBlend(trajectory, *found, spec.start.blend_s)
-    return Parts(
-        trajectory,
-        plant,
-        build_estimator(spec.estimator, robot, period, state),
-        build_controller(spec.controller, robot),
-        offset,
-    )
+    estimator = build_estimator(spec.estimator, robot, experiment.period, state)
+    return Parts(trajectory, plant, estimator, build_controller(spec.controller, robot), offset)
 
 
 def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple[Array, Array] | None:
@@ -191,17 +201,19 @@ def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple
 
 
 def _rehearse(experiment: Experiment) -> None:
-    """Run a few steps with parts of its own, so that nothing of the run itself is touched."""
-    parts, metrics = build_parts(experiment), Metrics(WARM_UP_STEPS, paced=False)
-    run_loop(
-        parts.trajectory,
-        parts.estimator,
-        parts.controller,
-        parts.plant,
-        metrics.add,
-        period=experiment.period,
-        duration=WARM_UP_STEPS * experiment.period,
-        pace=Unpaced(),
-        limits=SafetyLimits(np.inf, np.inf, WARM_UP_STEPS + 1),
-    )
-    parts.plant.close()
+    """Run a few steps with parts of its own, in simulation, so that nothing of the run itself is touched."""
+    simulated = SimulatedSettings(kind="simulated")
+    plant = SimulatedPlant(simulated, experiment.robot, experiment.period, experiment.spec.seed)
+    parts, metrics = build_parts(experiment, plant, plant.state), Metrics(WARM_UP_STEPS, paced=False)
+    with suppress(StoppedError):  # a run that ends so shall do it with a log
+        run_loop(
+            parts.trajectory,
+            parts.estimator,
+            parts.controller,
+            plant,
+            metrics.add,
+            period=experiment.period,
+            duration=WARM_UP_STEPS * experiment.period,
+            pace=Unpaced(),
+            limits=SafetyLimits(np.inf, np.inf, WARM_UP_STEPS + 1),
+        )

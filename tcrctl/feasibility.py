@@ -4,7 +4,8 @@
 
 At every sample Newton's method on the drives d brings the end to its place, the equilibrium being solved anew
 in each iteration. With J = ∂y/∂q ∂q/∂d (11) the step is the smallest one that removes the error; what it leaves
-free (robots with more cables than the pose has coordinates) is used to bring the tensions to their reference.
+free (robots with more cables than the pose has coordinates) is used to keep the tensions within their limits, not
+to make them equal: a shortened robot under equal tensions buckles to one side when its end may tilt.
 """
 
 from __future__ import annotations
@@ -27,20 +28,20 @@ from tcrctl.trajectory.trajectory import Trajectory, drives_of
 INTERVAL: Final = 0.25
 #: Errors up to which a pose counts as reached [m], [1]; half a degree.
 REACHED: Final = np.array([1e-3] * 3 + [np.radians(0.5)] * 3)
-#: Newton ends when the error is this part of REACHED and the step would change no tension by more than EVEN [N].
+#: Newton ends when the error is this part of REACHED and the step would change no tension by more than PULL [N].
 FINE: Final = 0.02
-EVEN: Final = 0.05
+PULL: Final = 0.05
 MAX_ITERATIONS: Final = 40
 MAX_HALVINGS: Final = 6
 #: Longest step of a drive in one iteration [m].
 LONGEST_STEP: Final = 0.02
 #: Directions of the drives that move the end less than this part of the strongest one count as free.
 RANK: Final = 2e-3
-#: Weight of a cable below the tension floor against the others, in what is left free.
-SLACK_WEIGHT: Final = 30.0
+#: Distance from floor and ceiling that cables keep where they can, as a part of the range between them.
+COMFORT: Final = 0.02
 #: Free directions are damped by these weights against tensions in N: of drives [N/m] and of the normal [N].
-DRIVE_WEIGHT: Final = 50.0
-TURN_WEIGHT: Final = 50.0
+DRIVE_WEIGHT: Final = 200.0
+TURN_WEIGHT: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,13 +52,17 @@ class DriveLimits:
         speed: Largest drive speed [m/s].
         floor: Lowest tension [N].
         ceiling: Highest tension [N].
-        reference: Tension that cables are drawn to where the pose leaves it open [N].
     """
 
     speed: float
     floor: float
     ceiling: float
-    reference: float
+
+    @property
+    def comfortable(self) -> tuple[float, float]:
+        """Tensions that cables are brought back to where the pose leaves a choice [N]."""
+        margin = COMFORT * (self.ceiling - self.floor)
+        return self.floor + margin, self.ceiling - margin
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +159,7 @@ def hold_pose(robot: Robot, target: Array, start: Held, limits: DriveLimits) -> 
         robot: The robot.
         target: End position [m], and end normal if it matters (3,) or (6,).
         start: Drives and shape to start from.
-        limits: Floor and reference of the tensions are used.
+        limits: Floor and ceiling of the tensions are used.
 
     Returns:
         The drives with their equilibrium, and the error left in units of REACHED.
@@ -162,7 +167,7 @@ def hold_pose(robot: Robot, target: Array, start: Held, limits: DriveLimits) -> 
     held, error = start, _error(robot, target, start.shape)
     for _ in range(MAX_ITERATIONS):
         step, pulled = _newton_step(robot, target, held, limits)
-        if error < FINE and pulled < EVEN:
+        if error < FINE and pulled < PULL:
             break
         size = float(np.max(np.abs(step)))
         held, found = _descend(robot, target, held, step * min(1.0, LONGEST_STEP / size), error)
@@ -198,7 +203,7 @@ def _descend(robot: Robot, target: Array, held: Held, step: Array, error: float)
 
 
 def _newton_step(robot: Robot, target: Array, held: Held, limits: DriveLimits) -> tuple[Array, float]:
-    """Change of the drives (m,) [m] that removes the error and, where that leaves a choice, evens tensions.
+    """Change of the drives (m,) [m] that removes the error and, where it may, brings tensions within limits.
 
     Also returns by how much the second part changes a tension at most [N].
     """
@@ -214,12 +219,12 @@ def _newton_step(robot: Robot, target: Array, held: Held, limits: DriveLimits) -
     if not free.size:
         return step, 0.0
     tension, gain = _tensions(robot, held)
-    weight = np.where(tension < limits.floor, SLACK_WEIGHT, 1.0)
-    missing = weight * (limits.reference - tension - gain @ step)
-    system = np.vstack((weight[:, None] * (gain @ free), turn @ free, DRIVE_WEIGHT * free))
-    wanted = np.concatenate((missing, -turn @ step, -DRIVE_WEIGHT * step))
-    even = free @ np.linalg.lstsq(system, wanted, rcond=None)[0]
-    return step + even, float(np.max(np.abs(gain @ even)))
+    after = tension + gain @ step
+    missing = np.clip(after, *limits.comfortable) - after
+    system = np.vstack((gain @ free, turn @ free, DRIVE_WEIGHT * free))
+    wanted = np.concatenate((missing, -turn @ step, np.zeros(robot.n_cables)))
+    spare = free @ np.linalg.lstsq(system, wanted, rcond=None)[0]
+    return step + spare, float(np.max(np.abs(gain @ spare)))
 
 
 def _tensions(robot: Robot, held: Held) -> tuple[Array, Array]:
@@ -266,4 +271,5 @@ def _check_stroke(t: float, drive: Array, robot: Robot) -> None:
     for name, length in zip(robot.cable_names, drive.tolist(), strict=True):
         if not low <= length <= high:
             limit = low if length < low else high
-            raise InfeasibleError(t, f"length of drive {name}", 1e3 * length, 1e3 * limit, "mm")
+            hint = "The robot's stroke_mm does not reach that far: make the path smaller."
+            raise InfeasibleError(t, f"length of drive {name}", 1e3 * length, 1e3 * limit, "mm", hint=hint)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -63,15 +65,21 @@ def _numbers() -> list[int]:
 
 
 @contextmanager
-def sigterm_exits() -> Iterator[None]:
-    """Let SIGTERM end the ``with`` body like ``sys.exit(143)``, for what happens before and after a run."""
+def signals_exit() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM end the process in the ``with`` body, while there is nothing to be made safe.
+
+    No exception is raised for it: the body compiles kernels, and unwinding the compiler half way through makes
+    it crash or drop the exception.
+    """
 
     def leave(number: int, frame: FrameType | None) -> NoReturn:
         del frame
-        raise SystemExit(128 + number)
+        print(f"stopped by {signal.Signals(number).name}", file=sys.stderr, flush=True)
+        os._exit(128 + number)
 
-    before = signal.signal(signal.SIGTERM, leave)
+    before = {number: signal.signal(number, leave) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

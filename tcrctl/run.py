@@ -6,13 +6,14 @@ LoadedSpec -> prepare -> plan -> run_experiment: folder, log, parts -> loop -> s
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedError, TcrctlError
-from tcrctl.experiment import Experiment, Notify, Parts, build_parts, silent
+from tcrctl.experiment import Experiment, Notify, Parts, build_parts, build_plant, silent
 from tcrctl.interruption import Interruption
 from tcrctl.log.geometry import CableRoute, LogGeometry
 from tcrctl.log.writer import LogWriter
@@ -61,12 +62,13 @@ def run_experiment(
     check_writable(out)
     with Interruption() as interruption:
         pace = RealTime(experiment.period, interruption.check) if realtime else Unpaced(interruption.check)
-        parts = build_parts(experiment)
+        plant, state = build_plant(experiment)
         try:
+            parts = build_parts(experiment, plant, state)
             folder = make_run_folder(out, experiment.spec.name)
             log = _open_log(experiment, folder, realtime=realtime)
         except BaseException:
-            parts.plant.close()
+            plant.close()
             raise
         summary = _recorded_run(experiment, parts, pace, folder, log, progress)
     try:
@@ -140,7 +142,7 @@ def _drive(
     """Go through all steps and leave the plant safe; return why it ended before the end, if it did."""
     failure: TcrctlError | None = None
     try:
-        log.event(0.0, "start", "info", f"start is {1e3 * parts.start_offset:.3f} mm beside the trajectory's")
+        log.event(0.0, "start", *_start_message(parts.start_offset))
         run_loop(
             parts.trajectory,
             parts.estimator,
@@ -160,6 +162,16 @@ def _drive(
         except TcrctlError as error:  # what ended the run first is the reason
             failure = failure or error
     return failure
+
+
+def _start_message(offset: float) -> tuple[str, str]:
+    """Level and text of what is known about the start."""
+    if math.isnan(offset):
+        return (
+            "warning",
+            "the tip ring is not measured: the run begins at the trajectory's start, not the robot's",
+        )
+    return "info", f"the robot starts {1e3 * offset:.3f} mm beside the trajectory"
 
 
 def _summary(

@@ -24,7 +24,9 @@ RealTime = Annotated[bool, typer.Option("--realtime", help="Pace a simulated pla
 Out = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Where the run's folder is made.", show_default=True)
 ]
-Seed = Annotated[int | None, typer.Option("--seed", metavar="N", min=0, help="Seed of everything random.")]
+Seed = Annotated[
+    int | None, typer.Option("--seed", metavar="N", min=0, max=2**63 - 1, help="Seed of everything random.")
+]
 Force = Annotated[bool, typer.Option("--force", help="Run even if the trajectory seems infeasible.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
@@ -52,48 +54,23 @@ def run(
       tcrctl run my_experiment.yaml --dry-run
       tcrctl run letter_t --json --out /data/runs | jq .position_error_mm.max
     """
-    from tcrctl.interruption import sigterm_exits
+    from tcrctl.interruption import signals_exit
     from tcrctl.spec import load_spec
 
     say: Notify = _nothing if quiet else _say
-    with sigterm_exits():
+    with signals_exit():
         loaded = load_spec(spec, overrides or ())
         say(_headline(loaded))
-        if dry_run:
-            _dry_run(loaded, seed, force, say, as_json=as_json)
-        else:
-            _run(loaded, out, seed, force, realtime, say, as_json=as_json, quiet=quiet)
+        if not dry_run:
+            _get_ready(out)
+        from tcrctl.experiment import prepare
 
-
-def _dry_run(loaded: LoadedSpec, seed: int | None, force: bool, say: Notify, *, as_json: bool) -> None:
-    from tcrctl.experiment import prepare
-
-    experiment = prepare(loaded, seed=seed, notify=say)
-    path = _planned(experiment, force, say)
-    print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
-
-
-def _run(
-    loaded: LoadedSpec,
-    out: Path,
-    seed: int | None,
-    force: bool,
-    realtime: bool,
-    say: Notify,
-    *,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    from tcrctl.run_folder import check_writable
-
-    check_writable(out)  # before the seconds that preparation takes
-    from tcrctl.experiment import prepare
-    from tcrctl.run import run_experiment
-
-    experiment = prepare(loaded, seed=seed, notify=say)
-    _planned(experiment, force, say)
-    with _progress_bar(loaded.spec.name, shown=not quiet) as progress:
-        summary = run_experiment(experiment, out=out, realtime=realtime, notify=say, progress=progress)
+        experiment = prepare(loaded, seed=seed, notify=say)
+        path = _planned(experiment, force, say)
+    if dry_run:
+        print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
+        return
+    summary = _run(experiment, out, realtime, say, quiet=quiet)
     if summary.reason:
         print(f"{'error' if summary.exit_code != 3 else summary.status}: {summary.reason}", file=sys.stderr)
     if as_json:
@@ -102,6 +79,21 @@ def _run(
         _print_summary(summary)
     if summary.exit_code:
         raise typer.Exit(summary.exit_code)
+
+
+def _get_ready(out: Path) -> None:
+    """Do what a run needs, before the seconds that preparation takes."""
+    from tcrctl.run_folder import check_writable
+
+    check_writable(out)
+    import tcrctl.run  # noqa: F401  (later a signal shall find it loaded)
+
+
+def _run(experiment: Experiment, out: Path, realtime: bool, say: Notify, *, quiet: bool) -> Summary:
+    from tcrctl.run import run_experiment
+
+    with _progress_bar(experiment.spec.name, shown=not quiet) as progress:
+        return run_experiment(experiment, out=out, realtime=realtime, notify=say, progress=progress)
 
 
 def _planned(experiment: Experiment, force: bool, say: Notify) -> StaticPath | None:
@@ -189,4 +181,4 @@ def _print_summary(summary: Summary) -> None:
     for name, text, style in rows(summary):
         table.add_row(escape(name), escape(text), style=style)
     console.print(table)
-    print(f"{summary.log}\nlook at it: tcrctl info {summary.log}")
+    print(f"look at the log: tcrctl info {summary.log}")
