@@ -35,7 +35,7 @@ class Interruption:
 
     def __enter__(self) -> Self:
         """Take the signals."""
-        if threading.current_thread() is threading.main_thread():
+        if _in_main_thread():
             for number in _numbers():
                 self._before[number] = signal.signal(number, self._handle)
         return self
@@ -55,6 +55,10 @@ class Interruption:
             raise KeyboardInterrupt
         else:
             raise SystemExit(128 + number)
+
+
+def _in_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
 
 
 def _numbers() -> list[int]:
@@ -77,7 +81,8 @@ def signals_exit() -> Iterator[None]:
         print(f"stopped by {signal.Signals(number).name}", file=sys.stderr, flush=True)
         os._exit(128 + number)
 
-    before = {number: signal.signal(number, leave) for number in (signal.SIGINT, signal.SIGTERM)}
+    numbers = (signal.SIGINT, signal.SIGTERM) if _in_main_thread() else ()
+    before = {number: signal.signal(number, leave) for number in numbers}
     try:
         yield
     finally:

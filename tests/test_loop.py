@@ -10,7 +10,7 @@ import pytest
 from loop_fakes import CABLES, PERIOD, Clock, FakeController, FakeEstimator, FakePlant, StraightLine
 
 from tcrctl.errors import DeviceError, RunInterruptedError, SafetyLimitError, StoppedError
-from tcrctl.interruption import Interruption
+from tcrctl.interruption import Interruption, signals_exit
 from tcrctl.loop import run_loop, step_count
 from tcrctl.pacing import LONGEST_NAP, RealTime, Unpaced
 from tcrctl.safety import SafetyLimits
@@ -274,7 +274,7 @@ def test_signals_are_given_back():
 
 def test_outside_the_main_thread_no_signal_is_taken():
     def enter():
-        with Interruption() as interruption:
+        with signals_exit(), Interruption() as interruption:
             interruption.check()
             seen.append(signal.getsignal(signal.SIGTERM))
 
