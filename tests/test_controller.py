@@ -11,6 +11,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from tcrctl.controller.controller import build_controller
+from tcrctl.controller.cost import outputs
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.multi_step import MultiStep, block_edges, superpose
 from tcrctl.controller.settings import CostWeights, IntegralSettings, IocSettings
@@ -194,7 +195,7 @@ def test_the_forecast_is_what_the_robot_then_does(tcr700):
     predictor = MultiStep(settings, tcr700)
     rng = np.random.default_rng(5)
     U = 0.004 * rng.standard_normal((settings.blocks, 6))
-    forecast = predictor.predict(resting(tcr700), 0.0, np.zeros(6))
+    forecast = predictor.predict(rest := resting(tcr700), 0.0, outputs(rest, 0.0, tcr700), np.zeros(6))
     predicted = forecast.prediction.free + forecast.prediction.gain @ U.ravel()
     state = dynamics.rest_state(tcr700.rest.q, np.zeros(6))
     ws, scratch = make_workspace(tcr700.model), dynamics.make_scratch(tcr700.model)

@@ -6,9 +6,10 @@ import numpy as np
 
 from tcrctl.controller.ioc import Weights
 from tcrctl.controller.settings import IocSettings
+from tcrctl.robot import pose
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
-from tcrctl.signals import Array, Reference
+from tcrctl.signals import Array, Estimate, Reference
 
 
 def make_weights(settings: IocSettings, m: int) -> Weights:
@@ -41,8 +42,9 @@ def input_limits(settings: IocSettings, robot: Robot, drive: Array, blocks: int)
     limit = settings.speed_limit_mm_s / 1000.0
     low, high = np.full(blocks * drive.shape[0], -limit), np.full(blocks * drive.shape[0], limit)
     m = drive.shape[0]
-    low[:m] = np.clip((robot.stroke[0] - drive) / settings.period_s, -limit, limit)
-    high[:m] = np.clip((robot.stroke[1] - drive) / settings.period_s, -limit, limit)
+    # a drive outside its stroke may still move back: limits never cross
+    low[:m] = np.minimum(np.maximum((robot.stroke[0] - drive) / settings.period_s, -limit), limit)
+    high[:m] = np.maximum(np.minimum((robot.stroke[1] - drive) / settings.period_s, limit), -limit)
     return low, high
 
 
@@ -50,3 +52,13 @@ def pose_error(reference: Reference, position: Array, normal: Array) -> Array:
     """Wanted minus measured end pose (6,): position [m], normal (0 where it is not tracked)."""
     turned = np.zeros(3) if reference.normal is None else reference.normal - normal
     return np.concatenate([reference.position - position, turned])
+
+
+def outputs(estimate: Estimate, age: float, robot: Robot) -> Array:
+    """Outputs now (7 + m,): end position, normal, twist, tensions, moved on by ``age`` [s] with the velocity."""
+    first = 3 * robot.tip
+    moved = age * (pose.output_matrix(estimate.q, robot.tip) @ estimate.v[first : first + 9])
+    twist = pose.twist(estimate.q, robot.tip)
+    now = np.concatenate([estimate.position, estimate.normal, [twist], estimate.tension])
+    now[:POSE_ROWS] += moved
+    return now

@@ -10,10 +10,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from tcrctl.controller.cost import input_limits, make_target, make_weights, pose_error
+from tcrctl.controller.cost import input_limits, make_target, make_weights, outputs, pose_error
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.ioc import Solution, build_ioc, solve_ioc
-from tcrctl.controller.multi_step import MultiStep, outputs
+from tcrctl.controller.multi_step import MultiStep
 from tcrctl.controller.one_step import OneStep
 from tcrctl.controller.predictor import Forecast, Predictor
 from tcrctl.controller.settings import IocSettings
@@ -56,7 +56,7 @@ class InstantaneousOptimalControl:
         now = outputs(estimate, age, self._robot)
         error = pose_error(reference, now[:3], now[3:6])
         shift = self._integral.update(error, bool(self._saturated.any()))
-        forecast = self._predictor.predict(estimate, age, self._speed)
+        forecast = self._predictor.predict(estimate, age, now, self._speed)
         low, high = input_limits(self._settings, self._robot, estimate.drive, self._predictor.blocks)
         solution = NO_SOLUTION
         reason = _doubt(estimate, forecast)
@@ -67,7 +67,9 @@ class InstantaneousOptimalControl:
             if not (solution.solved and solution.residual <= LCP_TOLERANCE):
                 reason = f"the complementarity problem was not solved (residual {solution.residual:.2g})"
         m = self._robot.n_cables
-        self._speed = np.zeros(m) if reason else np.clip(solution.inputs[:m], low[:m], high[:m])
+        self._speed = (
+            np.zeros(m) if reason else np.minimum(np.maximum(solution.inputs[:m], low[:m]), high[:m])
+        )
         limit = self._settings.speed_limit_mm_s / 1000.0
         self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
         info = ControlInfo(

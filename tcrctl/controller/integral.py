@@ -28,7 +28,7 @@ class IntegralAction:
 
         Saturated inputs cannot act on more shift (anti-windup), so it does not grow then.
         """
-        wanted = np.clip(self.shift + self._rate * error, -self._limit, self._limit)
+        wanted: Array = np.minimum(np.maximum(self.shift + self._rate * error, -self._limit), self._limit)
         if saturated:
             wanted = np.where(np.abs(wanted) < np.abs(self.shift), wanted, self.shift)
         self.shift = wanted

@@ -21,7 +21,7 @@ from numba import njit
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.predictor import Forecast
 from tcrctl.controller.settings import IocSettings
-from tcrctl.robot import linear, pose, response
+from tcrctl.robot import linear, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.model import FIXED, Model
@@ -211,25 +211,15 @@ class MultiStep:
             rest.copy(), np.zeros(robot.n_cables), robot.rest.gain.copy(), still, still.copy(), basis
         )
 
-    def predict(self, estimate: Estimate, age: float, speed: Array) -> Forecast:
+    def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""
         del speed  # the prediction is linear: it does not depend on the last input
         outcome, stable, free, gain = forecast(
             self._robot.model, self._load, self._work, self._memory, estimate.q + age * estimate.v, estimate.v,
             estimate.drive, self._period, self._blend, self.ahead, self._edges, self._robot.tip,
-            outputs(estimate, age, self._robot),
+            now,
         )  # fmt: skip
         outcome = Outcome(*outcome)
         good = outcome.converged and stable
         reason = "" if good else "the model has no stable equilibrium at the present drives"
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason)
-
-
-def outputs(estimate: Estimate, age: float, robot: Robot) -> Array:
-    """Outputs now (7 + m,): end position, normal, twist, tensions, moved on by ``age`` [s] with the velocity."""
-    first = 3 * robot.tip
-    moved = age * (pose.output_matrix(estimate.q, robot.tip) @ estimate.v[first : first + 9])
-    twist = pose.twist(estimate.q, robot.tip)
-    now = np.concatenate([estimate.position, estimate.normal, [twist], estimate.tension])
-    now[: response.POSE_ROWS] += moved
-    return now

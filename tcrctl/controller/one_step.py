@@ -43,8 +43,9 @@ class OneStep:
         dynamics.lengths_before(self._robot.model, q, v, drive, np.zeros_like(drive), 0.0, s, self._work)
         return Load(inertia, 1.0 / h, s.nodal, s.bar_before, s.cable_before)
 
-    def predict(self, estimate: Estimate, age: float, speed: Array) -> Forecast:
+    def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""
+        del now  # the step predicts outputs from the state itself
         h, m, tip = self._horizon, speed.shape[0], self._robot.tip
         load = self._load(estimate.q + age * estimate.v, estimate.v, estimate.drive)
         q = self._guess.copy()

@@ -39,6 +39,13 @@ class Predictor(Protocol):
     ahead: Array
     blocks: int
 
-    def predict(self, estimate: Estimate, age: float, speed: Array) -> Forecast:
-        """Predict from an estimate that is ``age`` [s] old, with ``speed`` (m,) [m/s] the last input."""
+    def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
+        """Predict from an estimate that is ``age`` [s] old.
+
+        Args:
+            estimate: The state.
+            age: Its age [s].
+            now: Outputs (7 + m,) as they should be now.
+            speed: The last input (m,) [m/s].
+        """
         ...

@@ -36,7 +36,9 @@ class PassiveObserver:
         self._robot, self._period = robot, period
         self._stiffness = settings.stiffness_n_m
         self._blend = -float(np.expm1(-period / settings.pose_filter_s))
-        self._rows = np.array(ring_rows(robot.n_modules))
+        rows = np.array(ring_rows(robot.n_modules))
+        self._coordinates = (3 * rows[:, None] + np.arange(3)).ravel()
+        self._tip_markers = np.flatnonzero((rows >= robot.tip) & (rows < robot.tip + 3))
         self._q, self._v = robot.rest.q.copy(), np.zeros_like(robot.rest.q)
         self._drive = np.zeros(robot.n_cables)
         self._still = np.zeros(robot.n_cables)
@@ -50,10 +52,10 @@ class PassiveObserver:
         inertia = 1.0 / h**2 + model.damping / h
         s.nodal[Q_FREE] = self._q + self._v / (h * inertia)
         s.nodal[FORCE] = self._robot.weight
-        s.nodal[SPRING] = 0.0
-        coordinates = (3 * self._rows[measured.valid, None] + np.arange(3)).ravel()
-        s.nodal[SPRING, coordinates] = self._stiffness * float(np.mean(measured.valid)) ** 2
-        s.nodal[SPRING_AT, coordinates] = measured.nodes[measured.valid].astype(float).ravel()
+        seen = np.repeat(measured.valid, 3)
+        stiffness = self._stiffness * float(np.mean(seen)) ** 2
+        s.nodal[SPRING, self._coordinates] = stiffness * seen
+        s.nodal[SPRING_AT, self._coordinates] = np.where(seen, measured.nodes.ravel(), 0.0)
         dynamics.lengths_before(model, self._q, self._v, self._drive, self._still, 0.0, s, self._work)
         return Load(inertia, 1.0 / h, s.nodal, s.bar_before, s.cable_before)
 
@@ -61,9 +63,8 @@ class PassiveObserver:
         """End position and normal, corrected by what the tip ring's markers say."""
         tip = self._robot.tip
         position, normal = pose.position(self._q, tip), pose.normal(self._q, tip)
-        seen = np.flatnonzero((self._rows >= tip) & (self._rows < tip + 3))
-        if measured.valid[seen].all():
-            ring = measured.nodes[seen].astype(float).ravel()
+        if measured.valid[self._tip_markers].all():
+            ring = measured.nodes[self._tip_markers].astype(float).ravel()
             error = np.concatenate([pose.position(ring, 0) - position, pose.normal(ring, 0) - normal])
             self._updates += 1  # the first ones are averaged, then the filter forgets
             self._correction = self._correction + max(self._blend, 1.0 / self._updates) * (
