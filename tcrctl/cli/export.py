@@ -37,10 +37,9 @@ def export(
     if as_csv == as_npz:
         raise InputError("give one format: --csv or --npz")
     target = out or log.with_suffix(".csv" if as_csv else ".npz")
-    if as_csv:
-        names = export_csv(log, target, nodes=nodes, force=force)
-    else:
-        names = export_npz(log, target, force=force)
+    names = (
+        export_csv(log, target, nodes=nodes, force=force) if as_csv else export_npz(log, target, force=force)
+    )
     if as_json:
         print(json.dumps({"status": "ok", "file": str(target), "columns": names}))
     else:
