@@ -238,6 +238,13 @@ def test_a_robot_without_a_stable_shape_is_refused_with_the_evidence(why):
     assert caught.value.iterations > 0
 
 
+def test_a_balance_that_is_a_saddle_is_refused_and_said_to_be_one():
+    unguided = NO_STABLE_SHAPE["a ring that no cable guides on one side"]
+    with pytest.raises(NoEquilibriumError, match="in balance, but unstable") as caught:
+        mechanics.altered("tcr5x4", *unguided, "cables.initial_tension_n=1")
+    assert caught.value.residual <= TOLERANCE
+
+
 def test_the_undeformed_stack_has_rods_at_their_rest_lengths():
     description = load_robot("tcr5x4")
     model = build_model(description, np.ones(4))

@@ -95,7 +95,10 @@ def equilibrium(
         q, outcome = _in_steps(model, start, (first, drive), load, ws)
     if not outcome.converged:
         text = ", ".join(f"{1000 * d:.1f}" for d in drive)
-        raise NoEquilibriumError(f"drives [{text}] mm", outcome.residual, TOLERANCE, outcome.iterations)
+        what = f"drives [{text}] mm" + (
+            " (in balance, but unstable)" if outcome.residual <= TOLERANCE else ""
+        )
+        raise NoEquilibriumError(what, outcome.residual, TOLERANCE, outcome.iterations)
     gain, column = np.zeros((ws.r.shape[0], drive.shape[0])), np.zeros(ws.r.shape[0])
     linear.solve(ws, ws.r, column)
     linear.drive_gain(ws, gain)
