@@ -90,9 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _prepare_process() -> None:
-    """Keep the control step undisturbed: no threads for small matrices, short turns for the log's thread."""
+    """Keep the control step undisturbed: threads for its small matrices would only wait for each other."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    sys.setswitchinterval(2e-4)
 
 
 def _known(error: Exception) -> TcrctlError:

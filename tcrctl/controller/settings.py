@@ -84,7 +84,7 @@ class IocSettings(Settings):
         description="piecewise constant inputs over the horizon; prediction: multi_step only",
     )
     modes: int = Field(
-        default=12, ge=1, le=60, description="modes of the prediction; prediction: multi_step only"
+        default=8, ge=1, le=60, description="modes of the prediction; prediction: multi_step only"
     )
     offset: OrOff[OffsetSettings] = Field(
         default=OffsetSettings(), description="offset of the equilibrium, or off; prediction: multi_step only"
