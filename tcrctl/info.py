@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from tcrctl.log.reader import Log, read_log
 
-_COLUMNS = ("k", "t", "period", "timing_control", "timing_lateness", "info_converged")
+_BUSY = ("timing_read", "timing_estimate", "timing_control", "timing_write")
+_COLUMNS = ("k", "t", "period", *_BUSY, "timing_lateness", "info_converged")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ class LogInfo:
         rate_hz: Mean step rate [Hz].
         period_s: Control period [s].
         jitter_ms: Deviation of successive step times from the period.
-        overruns: Steps that began after their deadline (``timing.lateness`` > 0; always 0 if not paced).
+        overruns: Steps that began late by more than a period or took longer than one; 0 in a run that was not paced.
         lateness_ms: By how much.
         control_ms: Duration of the controller.
         unconverged_steps: Steps whose inner problem was not solved.
@@ -139,10 +140,18 @@ def _timing(columns: dict[str, NDArray[Any]]) -> dict[str, Any]:
         "rate_hz": float(k[-1] - k[0]) / span if span > 0.0 else None,
         "period_s": float(np.median(columns["period"])),
         "jitter_ms": _spread(deviation),
-        "overruns": int(np.count_nonzero(lateness > 0.0)),
+        "overruns": _overruns(columns),
         "lateness_ms": _spread(lateness),
         "control_ms": _spread(columns["timing_control"]),
     }
+
+
+def _overruns(columns: dict[str, NDArray[Any]]) -> int:
+    """Count overruns as the run itself does; only a paced run is ever late."""
+    lateness, busy = columns["timing_lateness"], np.sum([columns[name] for name in _BUSY], axis=0)
+    return (
+        int(np.count_nonzero(np.maximum(lateness, busy) > columns["period"])) if np.any(lateness > 0.0) else 0
+    )
 
 
 def _spread(seconds: NDArray[np.float64]) -> Spread | None:
