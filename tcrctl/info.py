@@ -44,7 +44,7 @@ class LogInfo:
         rate_hz: Mean step rate [Hz].
         period_s: Control period [s].
         jitter_ms: Deviation of successive step times from the period.
-        overruns: Steps that began late by more than a period or took longer than one; 0 in a run that was not paced.
+        overruns: Steps that began late by more than a period or took longer than one; 0 if not paced.
         lateness_ms: By how much.
         control_ms: Duration of the controller.
         unconverged_steps: Steps whose inner problem was not solved.
