@@ -12,7 +12,8 @@ import os
 import resource
 import time
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
+os.environ.setdefault("NUMBA_OPT", "1")
 
 import numpy as np
 from rich.console import Console

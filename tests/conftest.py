@@ -39,6 +39,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Before numba is imported: one folder of compiled kernels per state of the sources, for all workers."""
     if "PYTEST_XDIST_WORKER" in os.environ or getattr(config, "cache", None) is None:
         return  # workers inherit the folder
+    os.environ.setdefault("NUMBA_OPT", "1")  # as the command line does
     folders = config.cache.mkdir("kernels")
     for folder in folders.iterdir():
         if time.time() - folder.stat().st_mtime > KEPT_S:

@@ -45,17 +45,20 @@ class PassiveObserver:
         self._correction = np.zeros(6)
         self._updates = 0
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
+        self._scratch.nodal[FORCE] = robot.weight
+        self._valid, self._seen = np.zeros(rows.shape[0], dtype=np.bool_), self._coordinates[:0]
 
     def _load(self, measured: Measurement) -> Load:
         """Inertia of backward Euler, weight and virtual springs of one update."""
         h, s, model = self._period, self._scratch, self._robot.model
         inertia = 1.0 / h**2 + model.damping / h
         s.nodal[Q_FREE] = self._q + self._v / (h * inertia)
-        s.nodal[FORCE] = self._robot.weight
-        seen = np.repeat(measured.valid, 3)
-        stiffness = self._stiffness * float(np.mean(seen)) ** 2
-        s.nodal[SPRING, self._coordinates] = stiffness * seen
-        s.nodal[SPRING_AT, self._coordinates] = np.where(seen, measured.nodes.ravel(), 0.0)
+        if not np.array_equal(measured.valid, self._valid):
+            self._valid = measured.valid.copy()
+            self._seen = self._coordinates[np.repeat(self._valid, 3)]
+            s.nodal[SPRING] = 0.0
+            s.nodal[SPRING, self._seen] = self._stiffness * float(np.mean(self._valid)) ** 2
+        s.nodal[SPRING_AT, self._seen] = measured.nodes[self._valid].ravel()
         dynamics.lengths_before(model, self._q, self._v, self._drive, self._still, 0.0, s, self._work)
         return Load(inertia, 1.0 / h, s.nodal, s.bar_before, s.cable_before)
 
