@@ -130,8 +130,6 @@ def build_ioc(
         else:
             H[a - m, a - m] += weights.speed_change
             H[a - m, a] -= weights.speed_change
-        for b in range(a):
-            H[a, b] = H[b, a]
     for a in range(size):
         for b in range(a):
             H[a, b] = H[b, a]
