@@ -2,8 +2,9 @@
 
     python benchmarks/robustness.py [--jobs N] [--only WORD] [--json]
 
-Every cell is a whole run on the mismatched, noisy, late plant of the shipped experiments, with one thing more. Errors are those of
-the plant's true end ring. Exit code 1 if a run diverges, an error is larger than 10 mm or 5 deg, or a step did not converge.
+Every cell is a whole run on the mismatched, noisy, late plant of the shipped experiments, one thing changed. Errors
+are those of the plant's true end ring. Exit code 1 if a run diverges, an error is larger than 10 mm or 5 deg, or a
+step did not converge.
 """
 
 from __future__ import annotations
@@ -53,7 +54,10 @@ CASES: dict[str, tuple[str, ...]] = {
     "push 0.2 N for 1 s, middle": (
         f"plant.pushes=[{{ring: 7, force_n: [0.0, 0.2, 0.0], start_s: {WHEN}, duration_s: 1.0}}]",
     ),
-    "start 5 mm off, no blending": ("plant.start_drives_mm=[2.4, 1.6, 0.0, 0.0, 0.0, 1.6]", "start.blend_s=0"),
+    "start 5 mm off, no blending": (
+        "plant.start_drives_mm=[2.4, 1.6, 0.0, 0.0, 0.0, 1.6]",
+        "start.blend_s=0",
+    ),
 }
 
 
