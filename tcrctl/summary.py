@@ -35,7 +35,14 @@ UNITS: Final[Mapping[str, str]] = {
 TASK: Final = "task."
 """Names that begin so are values that the task of the experiment defines."""
 
+_SUFFIXES: Final = {"mm": "mm", "rad": "rad", "deg": "deg", "s": "s"}
+
 Numbers = dict[str, float] | None
+
+
+def unit_of(name: str) -> str:
+    """Unit of a value of the result by its dotted name; names of a task's values end in theirs."""
+    return UNITS.get(name) or (_SUFFIXES.get(name.rpartition("_")[2], "") if name.startswith(TASK) else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +173,7 @@ def _verdict(criterion: Criterion, value: float | bool | None) -> Verdict:
         criterion.relation,
         criterion.limit,
         value,
-        UNITS.get(criterion.name, ""),
+        unit_of(criterion.name),
         value is not None and criterion.holds(value),
     )
 
