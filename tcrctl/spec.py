@@ -20,8 +20,8 @@ from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
 from tcrctl.plant.settings import PlantSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
-from tcrctl.settings import Settings, quantity, refuse
 from tcrctl.settings import Path as Keys
+from tcrctl.settings import Settings, quantity, refuse
 from tcrctl.summary import TASK, UNITS
 from tcrctl.task.settings import TaskSettings
 from tcrctl.trajectory.drive_settings import DrivesSettings

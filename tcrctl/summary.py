@@ -70,8 +70,8 @@ class Verdict:
         return {name: getattr(self, name) for name in ("name", "limit", "value", "unit", "passed")}
 
     def __str__(self) -> str:
-        value = "unknown" if self.value is None else f"{self.value:.4g} {self.unit}".rstrip()
-        return f"{self.name} is {value}, must be {self.relation} {self.limit:g}"
+        value = "unknown" if self.value is None else f"{_shown(self.value, '.4g')} {self.unit}".rstrip()
+        return f"{self.name} is {value}, must be {self.relation} {_shown(self.limit, 'g')}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +155,10 @@ class Summary:
             {**head, "reason": self.reason, **dataclasses.asdict(self.measures), **tail}
         )
         return made
+
+
+def _shown(value: float | bool, form: str) -> str:
+    return str(value).lower() if isinstance(value, bool) else format(value, form)
 
 
 def judge(criteria: Sequence[Criterion], result: Mapping[str, Any]) -> tuple[Verdict, ...]:

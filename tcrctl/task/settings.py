@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from statistics import fmean, median
 from typing import Annotated, Final, Literal, TypeAlias
 
-import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from tcrctl.settings import Path, Settings, quantity, refuse
@@ -24,13 +24,19 @@ WALLS: Final[dict[Wall, tuple[int, int]]] = {
 }  # fmt: skip
 
 
+def _middle(points: Sequence[Vector]) -> Vector:
+    x, y, z = (fmean(values) for values in zip(*points, strict=True))
+    return x, y, z
+
+
 def _three_or_more(markers: tuple[Vector, ...]) -> tuple[Vector, ...]:
     if len(markers) < 3:
         raise ValueError(f"needs at least 3 markers, it has {len(markers)}")
-    around = np.linalg.norm(np.array(markers) - np.mean(markers, axis=0), axis=1)
-    worst = int(np.argmax(np.abs(around - np.median(around))))
-    if abs(around[worst] - np.median(around)) > SYMMETRY_MM:
-        others = f"the others are {np.median(around):.4g} mm from it"
+    around = [math.dist(marker, _middle(markers)) for marker in markers]
+    usual = median(around)
+    worst = max(range(len(around)), key=lambda i: abs(around[i] - usual))
+    if abs(around[worst] - usual) > SYMMETRY_MM:
+        others = f"the others are {usual:.4g} mm from it"
         raise ValueError(
             f"marker {worst + 1} is {around[worst]:.4g} mm from the centre of all, {others}; they must be spread "
             "evenly around the axis"
@@ -53,8 +59,7 @@ class PipeSettings(Settings):
 
     @model_validator(mode="after")
     def _has_length(self) -> PipeSettings:
-        ends = (np.mean(markers, axis=0) for markers in (self.entry_markers_mm, self.exit_markers_mm))
-        if math.dist(*ends) < SYMMETRY_MM:
+        if math.dist(_middle(self.entry_markers_mm), _middle(self.exit_markers_mm)) < SYMMETRY_MM:
             raise ValueError("entry and exit are the same place")
         return self
 
