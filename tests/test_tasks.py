@@ -14,6 +14,7 @@ from pydantic import RootModel
 from records import record
 
 from tcrctl.numerics.bore import Bore
+from tcrctl.numerics.perforated_plate import blocks, nearest
 from tcrctl.numerics.rotation import matrix_from_quaternion, quaternion_exp
 from tcrctl.robot import pose
 from tcrctl.signals import Reference, Truth
@@ -186,6 +187,14 @@ def test_an_object_is_seen_through_the_hole_and_not_through_the_wall():
     assert result["objects"] == [{"name": "key", "detected": True, "first_seen_s": pytest.approx(0.1)}]
     assert (result["detected"], result["detection_s"], result["collision"]) == (1, pytest.approx(0.1), False)
     assert result["smallest_clearance_mm"] > 0.0
+
+
+def test_nothing_is_compiled_when_an_object_comes_into_view():
+    task = build_task(parsed(INSPECTION), 0, 0.005)
+    task.observe(placed([0.1, 0.0, 0.0], [-1, 0, 0]))
+    before = {kernel: list(kernel.signatures) for kernel in (blocks, nearest)}
+    assert task.observe(placed([0.1, 0.0, 0.0], [1, 0, 0], k=1))
+    assert all(kernel.signatures == known != [] for kernel, known in before.items())
 
 
 def test_an_object_behind_another_is_hidden():

@@ -141,5 +141,5 @@ def _print_table(report: Report) -> None:
         table.add_row(*(escape(cell) for cell in line.cells()), style=_STYLES.get(line.verdict, ""))
     console.print(table)
     for note in report.notes():
-        console.print(escape(note))
+        console.print(note, markup=False, highlight=False)
     print(f"report: {report.folder}")

@@ -62,8 +62,8 @@ def segment_distance(
     """
     du, dv, dw = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     length = math.sqrt(du * du + dv * dv + dw * dw)
-    middle = 0.5 * (start + end)
-    if point_distance(middle[0], middle[1], middle[2], half, holes) - 0.5 * length >= farthest:
+    u, v, w = start[0] + 0.5 * du, start[1] + 0.5 * dv, start[2] + 0.5 * dw
+    if point_distance(u, v, w, half, holes) - 0.5 * length >= farthest:
         return farthest
     parts, depths = np.empty(DEEPEST + 2), np.empty(DEEPEST + 2, np.int64)
     parts[0], depths[0], waiting, best = 0.5, 0, 1, farthest
@@ -109,13 +109,12 @@ class Plates(NamedTuple):
 
 
 @njit(cache=True)
-def _local(plates: Plates, i: int, point: Array) -> Array:
-    """Coordinates of a point (3,) in the frame of plate i."""
-    found = np.zeros(3)
+def _local(plates: Plates, i: int, point: Array, found: Array) -> None:
+    """Put the coordinates of a point (3,) in the frame of plate i into ``found`` (3,)."""
+    frame, middle = plates.frame, plates.middle
+    x, y, z = point[0] - middle[i, 0], point[1] - middle[i, 1], point[2] - middle[i, 2]
     for a in range(3):
-        for b in range(3):
-            found[a] += plates.frame[i, a, b] * (point[b] - plates.middle[i, b])
-    return found
+        found[a] = frame[i, a, 0] * x + frame[i, a, 1] * y + frame[i, a, 2] * z
 
 
 @njit(cache=True)
@@ -135,10 +134,12 @@ def nearest(
         The distance [m], the segment's row and the plate's; ``farthest``, -1, -1 if nothing is nearer.
     """
     best, segment, plate = farthest, -1, -1
+    a, b = np.empty(3), np.empty(3)
     for i in range(plates.half.shape[0]):
         holes = plates.holes[plates.first_hole[i] : plates.first_hole[i + 1]]
         for j in range(start.shape[0]):
-            a, b = _local(plates, i, start[j]), _local(plates, i, end[j])
+            _local(plates, i, start[j], a)
+            _local(plates, i, end[j], b)
             distance = segment_distance(a, b, plates.half[i], holes, best, tolerance)
             if distance < best:
                 best, segment, plate = distance, j, i
@@ -148,8 +149,10 @@ def nearest(
 @njit(cache=True)
 def blocks(plates: Plates, start: Array, end: Array) -> bool:
     """Tell whether the segment between two points (3,) [m] goes through the material of any plate."""
+    a, b = np.empty(3), np.empty(3)
     for i in range(plates.half.shape[0]):
-        holes = plates.holes[plates.first_hole[i] : plates.first_hole[i + 1]]
-        if crosses(_local(plates, i, start), _local(plates, i, end), plates.half[i], holes):
+        _local(plates, i, start, a)
+        _local(plates, i, end, b)
+        if crosses(a, b, plates.half[i], plates.holes[plates.first_hole[i] : plates.first_hole[i + 1]]):
             return True
     return False

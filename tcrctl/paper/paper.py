@@ -67,12 +67,14 @@ class Report:
 
     def notes(self) -> list[str]:
         """Sentences that belong below the table."""
-        verdicts = [line.verdict for line in self.lines]
-        asked = sum(verdict in ("goal", "met", *BAD) for verdict in verdicts)
-        met = asked - sum(verdict in BAD for verdict in verdicts)
+        verdicts = [line.verdict for line in self.lines if line.row.must is not None]
+        met, goals, idle = (
+            sum(v in wanted for v in verdicts) for wanted in (("met", "goal"), ("goal",), ("not run",))
+        )
+        left = f", {idle} not run" if idle else ""
         notes = [
-            f"{met} of {asked} bars met, {verdicts.count('goal')} goals too; {self.seconds:.0f} s with "
-            f"{self.workers} processes. Made by `tcrctl paper`."
+            f"{met} of {len(verdicts)} bars met{left}; {goals} goals met too. Made by `tcrctl paper` in "
+            f"{self.seconds:.0f} s with {self.workers} processes."
         ]
         if self.load > BUSY * self.cores:
             busy = f"load {self.load:.1f} on {self.cores} cores"

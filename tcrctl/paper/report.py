@@ -75,7 +75,8 @@ def make_line(row: Row, done: Mapping[Job, Done]) -> Line:
         reason = "; ".join(f"{item.job.label}: {item.reason}" for item in failed)
         return Line(row, None, "failed", reason, "", logs)
     if missing:
-        return Line(row, None, "not run", "", "", logs)
+        part = f"{len(row.jobs) - len(missing)} of {len(row.jobs)} runs done" if len(row.jobs) > 1 else ""
+        return Line(row, None, "not run", part, "", logs)
     results = [done[job].result for job in row.jobs]
     value = row.value(results)
     verdict = row.verdict(value)

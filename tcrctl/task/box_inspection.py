@@ -43,6 +43,7 @@ class BoxInspection:
         self._seen: dict[str, float] = {}
         self._clearance, self._touch = math.inf, ""
         self._collision: float | None = None
+        blocks(box.walls, box.origin, box.origin)  # compiled now, not when the first object comes into view
 
     def observe(self, step: StepRecord) -> list[Event]:
         """Take a step; return events: the first sight of an object, the first collision."""
