@@ -53,7 +53,10 @@ CASES: dict[str, tuple[str, ...]] = {
     "push 0.2 N for 1 s, middle": (
         f"plant.pushes=[{{ring: 7, force_n: [0.0, 0.2, 0.0], start_s: {WHEN}, duration_s: 1.0}}]",
     ),
-    "start 5 mm off, no blending": ("plant.start_drives_mm=[2.4, 1.6, 0.0, 0.0, 0.0, 1.6]", "start.blend_s=0"),
+    "start 5 mm off, no blending": (
+        "plant.start_drives_mm=[2.4, 1.6, 0.0, 0.0, 0.0, 1.6]",
+        "start.blend_s=0",
+    ),
 }
 
 
