@@ -16,10 +16,12 @@ from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
+from tcrctl.cli.paper import paper
 from tcrctl.cli.recover import recover
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
+from tcrctl.cli.stability import stability
 from tcrctl.cli.validate import validate
 from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
@@ -30,9 +32,11 @@ VERBS: dict[str, Callable[..., None]] = {
     "validate": validate,
     "new": new,
     "schema": schema,
+    "stability": stability,
     "info": info,
     "recover": recover,
     "export": export,
+    "paper": paper,
 }
 
 
