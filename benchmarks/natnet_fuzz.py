@@ -85,31 +85,37 @@ def decode(version: Version, message: int, payload: bytes) -> None:
         ServerInfo.decode(payload)
 
 
+def outcome_of(version: Version, message: int, payload: bytes) -> tuple[str, float]:
+    """What became of a payload, and the processor time [s]."""
+    start = time.thread_time()
+    try:
+        decode(version, message, payload)
+        outcome = "read"
+    except MalformedPacketError:
+        outcome = "refused"
+    except Exception as error:
+        outcome = repr(error)
+    return outcome, time.thread_time() - start
+
+
 def attack(packets: int, seed: int) -> tuple[collections.Counter[str], float, int]:
-    """Outcomes, worst time [s], largest allocation of a decoder [byte] (measured on every tenth packet)."""
-    rng, good = random.Random(seed), samples()
+    """Outcomes, worst time [s], and, while memory is traced, the largest allocation of a decoder [byte]."""
+    rng, good, sessions = random.Random(seed), samples(), {}
     outcomes: collections.Counter[str] = collections.Counter()
     worst, largest = 0.0, 0
-    sessions = {}
     for k in range(packets):
         version, message, payload = rng.choice(good)
         broken = mutated(payload, rng)
-        measure = k % 10 == 0
-        if measure:
-            tracemalloc.start()
-        start = time.thread_time()
-        try:
-            decode(version, message, broken)
-            outcomes["read"] += 1
-        except MalformedPacketError:
-            outcomes["refused"] += 1
-        except Exception as error:
-            outcomes[repr(error)] += 1
-        if measure:
-            largest = max(largest, tracemalloc.get_traced_memory()[1])
-            tracemalloc.stop()
+        if tracemalloc.is_tracing():
+            tracemalloc.reset_peak()
+            before = tracemalloc.get_traced_memory()[0]
+            outcome, _ = outcome_of(version, message, broken)
+            largest = max(largest, tracemalloc.get_traced_memory()[1] - before)
         else:
-            worst = max(worst, time.thread_time() - start)
+            outcome, seconds = outcome_of(version, message, broken)
+            if seconds > worst:  # the least of five: a collection of garbage is not the packet's fault
+                worst = max(worst, min(outcome_of(version, message, broken)[1] for _ in range(5)))
+        outcomes[outcome] += 1
         session = sessions.get(version)
         if session is None or session.failure is not None:
             session = sessions[version] = Session(NatNetSettings(multicast=True), 0.0)
@@ -126,18 +132,21 @@ def main() -> int:
     parser.add_argument("--packets", type=int, default=120_000)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    attack(2_000, options.seed + 1)  # whatever grows once has grown
+    start, third = time.perf_counter(), options.packets // 3
+    first, worst, _ = attack(third, options.seed)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    start = time.perf_counter()
-    outcomes, worst, largest = attack(options.packets, options.seed)
-    seconds = time.perf_counter() - start
+    second, later, _ = attack(third, options.seed + 1)
     growth = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    tracemalloc.start()
+    traced, _, largest = attack(options.packets - 2 * third, options.seed + 2)
+    seconds = time.perf_counter() - start
+    outcomes, worst = first + second + traced, max(worst, later)
     table = Table("what", "value", title=f"{options.packets} damaged packets in {seconds:.0f} s")
     for name, count in outcomes.most_common():
         table.add_row(name, str(count))
     table.add_row("worst time of a decoder", f"{1e3 * worst:.2f} ms CPU")
     table.add_row("largest allocation of a decoder", f"{largest / 1e3:.0f} kB")
-    table.add_row("growth of the process", f"{growth} kB")
+    table.add_row("growth of the process in the second third", f"{growth} kB")
     Console().print(table)
     return int(bool(set(outcomes) - {"read", "refused"}) or worst > 0.010 or largest > 1_000_000)
 
