@@ -13,7 +13,6 @@ import threading
 import time
 from types import TracebackType
 
-from tcr_hardware.errors import HardwareError
 from tcr_hardware.natnet import protocol
 from tcr_hardware.natnet.errors import RequestRefusedError, ServerSilentError
 from tcr_hardware.natnet.inbox import Inbox
@@ -72,7 +71,7 @@ class NatNetClient:
         self._receiver = Receiver(Sockets.open(self.settings), self._session, self._inbox, server)
         try:
             return self._await_server(server, timeout_s)
-        except HardwareError:
+        except BaseException:
             self.close()
             raise
 
