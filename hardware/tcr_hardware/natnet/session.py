@@ -29,6 +29,8 @@ from tcr_hardware.natnet.version_choice import VersionChoice
 #: So many packets in a row that cannot be read: ask the server anew who it is.
 MALFORMED_IN_A_ROW = 5
 RETRY_S = 0.25
+#: A frame that claims to be older than this has a wrong time stamp [s].
+LONGEST_LATENCY = 10.0
 #: Clock requests that may still be answered; older ones are given up.
 ECHOES = 4
 
@@ -79,7 +81,10 @@ class Session:
         return self.version is not None and self.models is not None
 
     def receive(self, datagram: bytes, now: float) -> MarkerFrame | None:
-        """Take a datagram that arrived at ``now`` [s]; return a frame if it holds a new one. Never raises."""
+        """Take a datagram that arrived at ``now`` [s]; return a frame if it holds a new one.
+
+        A packet that cannot be read is counted in ``malformed``; ``failure`` says why a server cannot be used at all.
+        """
         try:
             message, payload = protocol.split(datagram)
             frame = self._handle(message, payload, now)
@@ -121,7 +126,7 @@ class Session:
         if message == Message.FRAMEOFDATA:
             return self._frame(payload, now)
         if message == Message.SERVERINFO:
-            self._server_info(ServerInfo.decode(payload), now)
+            self._server_info(ServerInfo.decode(payload))
         elif message == Message.MODELDEF and self.version is not None:
             self.models = decode_models(payload, self.version)
             self.model_updates += 1
@@ -129,17 +134,16 @@ class Session:
             self._echo(payload, now)
         elif message in (Message.RESPONSE, Message.UNRECOGNIZED_REQUEST):
             self._response(message, payload)
-        elif message == Message.DISCONNECTBYTIMEOUT:
-            self.last_problem, self.server = "the server dropped us for want of keep-alives", None
+        elif message in (Message.DISCONNECT, Message.DISCONNECTBYTIMEOUT):
+            self.last_problem, self.server = "the server ended the connection", None
         elif message == Message.MESSAGESTRING:
             self.last_problem = "server: " + payload.partition(b"\0")[0][:200].decode("utf-8", "replace")
         return None
 
-    def _server_info(self, info: ServerInfo, now: float) -> None:
+    def _server_info(self, info: ServerInfo) -> None:
         """The server introduced itself: for the first time, again, or as another one."""
         same, self.server = info == self.server, info
-        settling = self.choice.pending or self.choice.stream is not None
-        if same and settling and self._in_a_row < MALFORMED_IN_A_ROW:
+        if same and (self.choice.pending or self.choice.stream is not None):
             return
         self._in_a_row = 0
         self.choice.server_speaks(info.version)
@@ -179,6 +183,10 @@ class Session:
         if latency is None and suffix.received and suffix.transmit and self.clock.hz:
             latency = (suffix.transmit - suffix.received) / self.clock.hz
         exposure = self.clock.local(suffix.mid_exposure)
+        if exposure is not None:
+            latest = now + (self.clock.uncertainty(now) or 0.0)
+            if not now - LONGEST_LATENCY < exposure <= latest:
+                exposure, self.last_problem = None, "a frame was exposed at an impossible time"
         return MarkerFrame(self.order.sessions, self.frames - 1, now, exposure, latency, data, self.models)
 
     def _echo(self, payload: bytes, now: float) -> None:
