@@ -83,7 +83,7 @@ class Session:
     def receive(self, datagram: bytes, now: float) -> MarkerFrame | None:
         """Take a datagram that arrived at ``now`` [s]; return a frame if it holds a new one.
 
-        A packet that cannot be read is counted in ``malformed``; ``failure`` says why a server cannot be used at all.
+        A packet that cannot be read is counted in ``malformed``; ``failure`` tells of a server that cannot be used.
         """
         try:
             message, payload = protocol.split(datagram)
