@@ -266,6 +266,19 @@ def test_changed_models_reach_the_client():
         assert client.statistics().model_updates >= 2
 
 
+def test_names_can_be_waited_for():
+    with linked() as (motive, client):
+        motive.change_models([f"other.{name}" for name in NAMES])
+        eventually(lambda: client.models is None or "other.m1.n1" in client.models.labels())
+        assert "other.m1.n1" in client.wait_models().labels()
+        frames(client, 5)  # the change is no longer flagged
+        motive.faults.mute = True
+        motive.change_models(NAMES)
+        eventually(lambda: client.models is None)
+        with pytest.raises(ServerSilentError, match="model definitions"):
+            client.wait_models(timeout_s=0.1)
+
+
 def test_a_changed_version_is_followed():
     for options in ({}, {"multicast": True}) if multicast_works() else ({},):
         with linked(version="4.1", **options) as (motive, client):

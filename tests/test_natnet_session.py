@@ -180,6 +180,24 @@ def test_changed_models_take_the_names_away_until_they_are_told_anew():
     assert session.model_updates == 2
 
 
+def test_names_that_change_twice_while_the_flag_is_up_are_asked_for_again_at_its_end():
+    session, server = Session(UNICAST, 0.0), Server((4, 1))
+    now = talk(session, server, 0.0)
+    session.receive(server.frame(now, params=2), now)
+    now = talk(session, server, now)
+    server.models = {"second": ["a"]}
+    session.receive(server.frame(now, params=2), now)
+    now = talk(session, server, now)
+    assert "second.a" not in session.models.labels()
+    session.receive(server.frame(now), now)
+    assert session.models is not None
+    now = talk(session, server, now)
+    assert "second.a" in session.models.labels()
+    asked = server.asked.count(REQUEST_MODELDEF)
+    talk(session, server, now)
+    assert server.asked.count(REQUEST_MODELDEF) == asked
+
+
 def test_a_restarted_server_is_a_new_session_with_new_names_and_a_new_clock():
     session, server = Session(UNICAST, 0.0), Server((4, 1))
     now = talk(session, server, 0.0)

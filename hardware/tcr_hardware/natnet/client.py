@@ -96,6 +96,20 @@ class NatNetClient:
         """What the server tracks; None until told, and for a moment after a change."""
         return self._session.models
 
+    def wait_models(self, timeout_s: float = 1.0) -> ModelDefinitions:
+        """Return what the server tracks; wait if it is about to tell anew.
+
+        Raises:
+            ServerSilentError: It did not tell within ``timeout_s``.
+            HardwareError: Receiving has ended, for the reason given.
+        """
+        end = time.monotonic() + timeout_s
+        while (models := self._session.models) is None:
+            if not self._inbox.wait(lambda: self._session.models is not None, end - time.monotonic()):
+                raise ServerSilentError(self.settings.address, "model definitions", timeout_s)
+            self._inbox.check()
+        return models
+
     def newest(self) -> MarkerFrame | None:
         """Return the newest frame without waiting, or None before the first.
 

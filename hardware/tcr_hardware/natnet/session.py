@@ -63,7 +63,7 @@ class Session:
         self.on_response: Callable[[int, bytes], None] = lambda message, payload: None
         self._in_a_row = 0
         self._heard = now
-        self._models_changing = False
+        self._models_changing = self._refresh_models = False
         self._echoes: deque[int] = deque(maxlen=ECHOES)
         self._timers = Timers(
             now, connect=RETRY_S, bitstream=RETRY_S, models=RETRY_S, keep_alive=settings.keep_alive_s,
@@ -105,7 +105,8 @@ class Session:
             return wanted
         if self.choice.pending and self._timers.due("bitstream", now):
             wanted += [protocol.request(text) for text in self.choice.questions()]
-        if self.version is not None and self.models is None and self._timers.due("models", now):
+        outdated = self.models is None or self._refresh_models
+        if self.version is not None and outdated and self._timers.due("models", now):
             wanted.append(protocol.envelope(Message.REQUEST_MODELDEF))
         if not self.settings.multicast and self._timers.due("keep_alive", now):
             wanted.append(protocol.envelope(Message.KEEPALIVE))
@@ -128,7 +129,7 @@ class Session:
         if message == Message.SERVERINFO:
             self._server_info(ServerInfo.decode(payload))
         elif message == Message.MODELDEF and self.version is not None:
-            self.models = decode_models(payload, self.version)
+            self.models, self._refresh_models = decode_models(payload, self.version), False
             self.model_updates += 1
         elif message == Message.ECHORESPONSE:
             self._echo(payload, now)
@@ -161,9 +162,7 @@ class Session:
         arrival = self.order.classify(data.number, now, models_changed=data.has(MODELS_CHANGED))
         if arrival not in (Arrival.NEXT, Arrival.NEW_SESSION):
             return None
-        if arrival is Arrival.NEW_SESSION or (data.has(MODELS_CHANGED) and not self._models_changing):
-            self._forget_models()
-        self._models_changing = data.has(MODELS_CHANGED)
+        self._notice_models(arrival is Arrival.NEW_SESSION, data.has(MODELS_CHANGED))
         if data.has(BITSTREAM_CHANGED):
             self.choice.ask_again()
         if arrival is Arrival.NEW_SESSION:
@@ -171,6 +170,15 @@ class Session:
             self._timers.now_due("echo")
         self.frames += 1
         return self._on_our_clock(data, now)
+
+    def _notice_models(self, new_session: bool, flagged: bool) -> None:
+        """The flag may stay for many frames: its beginning counts, and its end, for what changed in between."""
+        if new_session or (flagged and not self._models_changing):
+            self._forget_models()
+        elif self._models_changing and not flagged:
+            self._refresh_models = True
+            self._timers.now_due("models")
+        self._models_changing = flagged
 
     def _forget_models(self) -> None:
         """Names may have changed: none is better than a wrong one."""
