@@ -15,6 +15,7 @@ from tcr_hardware.emulators.motive_settings import MotiveSettings
 from tcr_hardware.errors import HardwareError, SocketError
 from tcr_hardware.natnet.client import NatNetClient
 from tcr_hardware.natnet.errors import RequestRefusedError, ServerSilentError, UnsupportedVersionError
+from tcr_hardware.natnet.frame import MODELS_CHANGED
 from tcr_hardware.natnet.settings import NatNetSettings
 
 NAMES = [f"m{i}.n{j}" for i in (1, 2) for j in (1, 2, 3)]
@@ -271,7 +272,7 @@ def test_names_can_be_waited_for():
         motive.change_models([f"other.{name}" for name in NAMES])
         eventually(lambda: client.models is None or "other.m1.n1" in client.models.labels())
         assert "other.m1.n1" in client.wait_models().labels()
-        frames(client, 5)  # the change is no longer flagged
+        eventually(lambda: not client.newest().data.has(MODELS_CHANGED))
         motive.faults.mute = True
         motive.change_models(NAMES)
         eventually(lambda: client.models is None)
