@@ -190,6 +190,7 @@ def test_a_data_port_in_use_still_leaves_the_command_socket():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port))
         with linked(data_port=port) as (_, client):
+            assert f"not listening at 127.0.0.1:{port}" in client.statistics().last_problem
             frames(client, 3)
 
 
