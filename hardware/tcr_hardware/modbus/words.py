@@ -70,7 +70,7 @@ class WordCodec:
         return word if self.byte_order == "big" else (word & 0xFF) << 8 | word >> 8
 
 
-def _raw(register: Register, value: float) -> float:
+def _raw(register: Register, value: object) -> float:
     """Counts of a value."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise SetpointError(register.name, value, "finite numbers")
