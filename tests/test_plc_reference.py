@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from structured_text import FunctionBlock
 
@@ -133,6 +134,79 @@ def test_both_plcs_trip_stop_and_reset_alike(armed):
     assert armed.emulated.fault is Fault.FOLLOWING_ERROR
 
 
+def test_both_plcs_refuse_to_enable_before_the_zero_is_taken():
+    both = BothPlcs()
+    both.write(ON, (0,) * 6)
+    both.run(3)
+    assert not both.emulated.enabled
+    assert Status.READY not in both.emulated.status()
+
+
+@pytest.mark.parametrize("cause", ["estop", "drive_lost"])
+def test_both_plcs_clear_a_fault_only_after_its_cause_is_gone(armed, cause):
+    setattr(armed.emulated, cause, True)
+    armed.run(2)
+    for gone in (False, True):
+        setattr(armed.emulated, cause, not gone)
+        armed.write(Control.RUN, (0,) * 6)
+        armed.run(2)
+        armed.write(Control.RUN | Control.RESET, (0,) * 6)
+        armed.run(2)
+        assert (armed.emulated.fault is Fault.NONE) == gone
+
+
+def moving(both):
+    """Axis 1 on its way at 90 mm/s."""
+    for k in range(1, 6):
+        both.write(FOLLOW, (3_000 * k, 0, 0, 0, 0, 0), 90_000)
+        both.run(16)
+
+
+@pytest.mark.parametrize(
+    "control", [Control.RUN | Control.ZERO, Control.RUN | Control.RESET, FOLLOW | Control.ZERO]
+)
+def test_both_plcs_ignore_zero_and_reset_while_a_drive_moves(armed, control):
+    moving(armed)
+    if Control.FOLLOW not in control:
+        armed.emulated.drive_lost = True
+        armed.run(1)
+        armed.emulated.drive_lost = False
+        armed.write(Control.RUN, (0,) * 6)
+        armed.run(1)
+    assert armed.emulated._moving()
+    armed.write(control, (13_000, 0, 0, 0, 0, 0), 90_000)
+    armed.run(60)
+    assert armed.emulated.positions()[0] > 10_000
+
+
+@pytest.mark.parametrize(
+    ("setpoints", "vmax", "reject", "axis"),
+    [
+        ((0, 0, 60_001, 0, 0, 0), 50_000, Reject.RANGE, 3),
+        ((0, 0, 0, 0, -60_001, 60_001), 50_000, Reject.RANGE, 5),
+        ((0, 6_001, 0, 0, -6_001, 0), 50_000, Reject.STEP, 2),
+        ((0,) * 6, 0, Reject.SPEED, 0),
+        ((0,) * 6, 100_100, Reject.SPEED, 0),
+        ((6_000,) * 6, 100_000, Reject.NONE, 0),
+    ],
+)
+def test_both_plcs_judge_a_set_alike(armed, setpoints, vmax, reject, axis):
+    armed.write(FOLLOW, (0,) * 6)
+    armed.run(20)
+    armed.write(FOLLOW, setpoints, vmax)
+    armed.run(80)
+    assert armed.emulated.reject == (reject, axis)
+
+
+def test_both_plcs_forget_the_silence_before_they_were_enabled(armed):
+    armed.write(Control.RUN, (0,) * 6)
+    armed.run(99)
+    armed.command = replace(armed.command, control=ON)  # the same heartbeat
+    armed.text["HR"][0] = int(ON)
+    armed.run(50)
+    assert armed.emulated.enabled
+
+
 positions = st.integers(-62_000, 62_000)
 events = st.tuples(
     st.sampled_from(["creep", "creep", "creep", "send", "hold", "stop", "silence", "estop", "drive", "jam", "reset",
@@ -175,7 +249,9 @@ def act(both, what, wanted, vmax, scans):
     both.run(scans)
 
 
-@settings(max_examples=40)
+@settings(
+    max_examples=40, phases=(Phase.explicit, Phase.generate)
+)  # a difference is told at once, not made smaller
 @given(st.lists(events, max_size=14))
 def test_emulated_program_and_structured_text_agree_scan_by_scan_whatever_happens(script):
     both = BothPlcs()
