@@ -189,6 +189,19 @@ def test_a_serial_device_that_does_not_exist_is_named(tmp_path):
     assert "no such device" in lost.value.hint
 
 
+def test_a_closed_bus_stays_closed_until_it_is_opened_again(bus, plc):
+    bus.exchange(STILL, Control.RUN, SPEED)
+    bus.close()
+    bus.close()
+    before = plc.read(0, 16)
+    for use in (lambda: bus.exchange(STILL, Control.RUN, SPEED), bus.read_status, bus.read_slow):
+        with pytest.raises(LinkLostError, match="not open"):
+            use()
+    assert plc.read(0, 16) == before
+    bus.open()
+    bus.exchange(STILL, Control.RUN, SPEED)
+
+
 def test_a_bad_set_point_is_never_sent_and_does_not_count(bus, plc):
     bus.exchange(STILL, Control.RUN, SPEED)
     before = plc.read(0, 16)
