@@ -465,6 +465,22 @@ def test_a_serial_line_with_a_baud_rate_answers_no_faster_than_its_wire(plc):
         assert status.round_trip_s >= 0.0184
 
 
+@pytest.mark.parametrize("axes", [1, 3, 12])
+def test_a_robot_may_have_any_number_of_axes(axes):
+    rows = register_map(axes)
+    with PlcEmulator(replace(CALM, axes=axes)) as plc:
+        plc.start()
+        with PlcBus(settings_for(plc, map=rows)) as bus:
+            settle(bus, (0,) * axes, ON, exchanges=3)
+            target = tuple(100 * axis for axis in range(axes))
+            assert settle(bus, target, FOLLOW, exchanges=40).positions_um == pytest.approx(target, abs=20)
+
+
+def test_an_emulator_and_its_map_have_the_same_axes():
+    with pytest.raises(HardwareError, match="3 axes cannot serve a map of 6 axes"):
+        PlcEmulator(PlcSettings(axes=3, map=register_map(6)))
+
+
 def test_the_emulator_leaves_no_thread_behind():
     before = threading.active_count()
     with PlcEmulator() as plc:
