@@ -17,6 +17,7 @@ from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.recover import recover
+from tcrctl.cli.replay import replay
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
@@ -33,6 +34,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "info": info,
     "recover": recover,
     "export": export,
+    "replay": replay,
 }
 
 

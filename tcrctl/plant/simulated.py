@@ -8,6 +8,7 @@ import numpy as np
 
 from tcrctl.errors import DivergenceError
 from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plant.stroke import within_stroke
 from tcrctl.robot import dynamics, pose
 from tcrctl.robot.equations import make_workspace
 from tcrctl.robot.model import FIXED, ring_rows
@@ -62,15 +63,12 @@ class SimulatedPlant:
         Raises:
             DivergenceError: If a time step did not converge.
         """
-        low, high = self.robot.stroke
-        before = self._state.drive
-        drive = np.clip(before + self.period * command.speed, low, high)
-        applied = Command((drive - before) / self.period, drive)
+        applied = within_stroke(command, self._state.drive, self.period, self.robot.stroke)
         self._advance(applied.speed, self.period - self._late)
         self._seen.append(self._state.q.copy())
         self._advance(applied.speed, self._late)
         self.time += self.period
-        self._state.drive[:] = drive  # the sum of many sub-steps differs from it by rounding
+        self._state.drive[:] = applied.drive  # the sum of many sub-steps differs from it by rounding
         return applied
 
     def _advance(self, speed: Array, duration: float) -> None:
