@@ -146,7 +146,7 @@ class Comparison:
             return bool(was.shape == now.shape and self._close(was, now).all())
         if isinstance(was, float) and isinstance(now, float):
             # only equal bits are equal: neither the two zeros nor two kinds of NaN are
-            return np.float64(was).tobytes() == np.float64(now).tobytes() or bool(self._close(was, now))
+            return bool(np.float64(was).tobytes() == np.float64(now).tobytes() or self._close(was, now))
         return bool(was == now) if was is not None and now is not None else was is now
 
     def _close(self, was: Any, now: Any) -> Any:
@@ -194,10 +194,10 @@ def _sizes(was: Any, now: Any) -> NDArray[np.float64]:
     return size[~np.isnan(size)]
 
 
-def _value(value: Any) -> Value:
+def _value(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return f"{value.shape} numbers"
-    return "none" if value is None else value  # type: ignore[no-any-return]
+    return "none" if value is None else value
 
 
 def _plain(value: Value) -> Value:

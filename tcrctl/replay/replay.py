@@ -141,8 +141,8 @@ def replay(
     path: str | os.PathLike[str],
     *,
     overrides: Sequence[str] = (),
-    window: Window = Window(),  # noqa: B008  (frozen)
-    tolerance: Tolerance = Tolerance(),  # noqa: B008  (frozen)
+    window: Window = Window(),
+    tolerance: Tolerance = Tolerance(),
     out: Path | None = None,
     announce: Announce = _silent,
     progress: Progress = _quiet,

@@ -17,8 +17,8 @@ from tcrctl.run_folder import RESOLVED
 def open_replayed(out: Path, log: Log, origin: Origin, robot: Robot) -> LogWriter:
     """Open a log for the replayed steps of another one.
 
-    It has the attachments of the other log, with the settings and versions of the replay, and says in its start record
-    what it was replayed from.
+    It has the attachments of the other log, with the settings and versions of the replay, and says in its start
+    record what it was replayed from.
 
     Args:
         out: File to create; it must not exist.
