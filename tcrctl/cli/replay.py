@@ -46,9 +46,9 @@ def replay(
 ) -> None:
     r"""Feed a log to its own controller, and compare commands, estimates and tensions bit for bit.
 
-    Robot, estimator and controller are rebuilt from the files attached to the log. Measurements, references and
-    applied commands are the recorded ones. With --set, settings of controller, estimator or safety are changed: what
-    would it have done with the same input? The robot does not answer to it; for that, run the experiment again.
+    Robot, estimator and controller are rebuilt from the files attached to the log; measurements, references and
+    applied commands are the recorded ones. --set changes settings of controller, estimator or safety: what would
+    it have done with the same input? The robot does not answer to it; for that, run the experiment again.
     Exit code 0 if every step is identical, 3 if one is not, or if steps are missing between others.
 
     \b

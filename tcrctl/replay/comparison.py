@@ -147,7 +147,7 @@ class Comparison:
         if isinstance(was, float) and isinstance(now, float):
             # only equal bits are equal: neither the two zeros nor two kinds of NaN are
             return bool(np.float64(was).tobytes() == np.float64(now).tobytes() or self._close(was, now))
-        return bool(was == now) if was is not None and now is not None else was is now
+        return bool(was == now)
 
     def _close(self, was: Any, now: Any) -> Any:
         """True where a number is within the tolerance; bits of NaN do not count if there is one."""
