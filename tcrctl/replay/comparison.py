@@ -142,7 +142,7 @@ class Comparison:
     def _same(self, was: Any, now: Any) -> bool:
         if isinstance(was, np.ndarray) and isinstance(now, np.ndarray):
             if was.tobytes() == now.tobytes():
-                return was.shape == now.shape
+                return bool(was.shape == now.shape)
             return bool(was.shape == now.shape and self._close(was, now).all())
         if isinstance(was, float) and isinstance(now, float):
             # only equal bits are equal: neither the two zeros nor two kinds of NaN are
