@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.log.checksums import checksums
 from tcrctl.log.event import Event
-from tcrctl.log.schema import MESSAGES, SCALARS, Field, wire_class
+from tcrctl.log.schema import MESSAGES, OPAQUE, SCALARS, SPARSE, Field, wire_class
 from tcrctl.signals import (
+    Checksums,
     Command,
     ControlInfo,
     Estimate,
@@ -29,6 +32,7 @@ _RECORDS: Final[dict[str, type]] = {
     "ControlInfo": ControlInfo,
     "Truth": Truth,
     "Timing": Timing,
+    "Checksums": Checksums,
     "Event": Event,
 }
 _WIRE: Final = {name: wire_class(name) for name in MESSAGES}
@@ -38,6 +42,8 @@ _DTYPES: Final[dict[str, np.dtype[Any]]] = {
     "float[]": np.dtype("<f4"),
     "bool[]": np.dtype(np.bool_),
 }
+_NOTHING: Final[frozenset[tuple[str, str]]] = frozenset()
+_LEAN: Final = SPARSE | {("Measurement", "nodes")}
 
 
 def encode(name: str, record: object) -> bytes:
@@ -52,8 +58,43 @@ def encode(name: str, record: object) -> bytes:
     return bytes(message.SerializeToString())
 
 
-def _fill(message: Any, name: str, record: object) -> None:
+def encode_step(step: StepRecord, *, full: bool = True) -> bytes:
+    """Encode a step with its checksums, in full or lean; see :mod:`tcrctl.log.schema`.
+
+    Args:
+        step: The step, with its full state.
+        full: Write the full state too.
+
+    Raises:
+        ValueError: As :func:`encode`.
+    """
+    message = _WIRE["Step"]()
+    _fill(message, "Step", step, _NOTHING if full else _LEAN)
+    _fill(message.checksums, "Checksums", checksums(step))
+    if not full:
+        message.marker_planes = planes(step.measurement.nodes)
+    return bytes(message.SerializeToString())
+
+
+def planes(nodes: NDArray[np.float32]) -> bytes:
+    """Bytes of all coordinates (n, 3) by significance, the lowest of all first: (4, 3 n)."""
+    return np.ascontiguousarray(nodes, "<f4").view(np.uint8).reshape(-1, 4).T.tobytes()
+
+
+def from_planes(data: bytes) -> NDArray[np.float32]:
+    """Inverse of :func:`planes`.
+
+    Raises:
+        ValueError: If the number of bytes does not make whole markers.
+    """
+    sorted_bytes = np.frombuffer(data, np.uint8).reshape(4, -1)
+    return np.ascontiguousarray(sorted_bytes.T).view("<f4").reshape(-1, 3)
+
+
+def _fill(message: Any, name: str, record: object, omitted: frozenset[tuple[str, str]] = _NOTHING) -> None:
     for field in MESSAGES[name]:
+        if field.kind == OPAQUE or (name, field.name) in omitted:
+            continue
         value = getattr(record, field.name)
         if value is None and field.optional:
             continue
@@ -64,7 +105,7 @@ def _fill(message: Any, name: str, record: object) -> None:
         else:
             child = getattr(message, field.name)
             child.SetInParent()
-            _fill(child, field.kind, value)
+            _fill(child, field.kind, value, omitted)
 
 
 def _array_bytes(name: str, field: Field, value: NDArray[Any]) -> bytes:
@@ -88,9 +129,19 @@ def decode(name: str, data: bytes) -> Any:
 
 
 def decode_step(data: bytes) -> StepRecord:
-    """Decode a ``/tcrctl/step`` message; its arrays are writable copies, equal bit for bit."""
-    step: StepRecord = decode("Step", data)
-    return step
+    """Decode a ``/tcrctl/step`` message; its arrays are writable copies, equal bit for bit.
+
+    Arrays that a lean step leaves out are empty.
+
+    Raises:
+        google.protobuf.message.DecodeError: If ``data`` is not such a message.
+        ValueError: If an array in it is no whole number of values.
+    """
+    message = _WIRE["Step"].FromString(data)
+    step: StepRecord = _record(message, "Step")
+    if not message.marker_planes:
+        return step
+    return replace(step, measurement=replace(step.measurement, nodes=from_planes(message.marker_planes)))
 
 
 def decode_event(data: bytes) -> Event:
@@ -100,7 +151,7 @@ def decode_event(data: bytes) -> Event:
 
 
 def _record(message: Any, name: str) -> Any:
-    values = {field.name: _value(message, field) for field in MESSAGES[name]}
+    values = {field.name: _value(message, field) for field in MESSAGES[name] if field.kind != OPAQUE}
     return _RECORDS[name](**values)
 
 

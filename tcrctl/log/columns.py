@@ -3,7 +3,7 @@
 ``estimate.position`` of :class:`tcrctl.signals.StepRecord` is column ``estimate_position`` with shape
 (n_steps, 3); ``truth.q`` is ``truth_q``, and so on for every field of every record. Units are those of the
 record, all SI (:data:`COLUMNS`). Where a step has no value (no normal in position-only tracking, fewer
-prediction instants than others) floats are NaN, bools False. Columns of
+prediction instants than others, no full state in a lean step) floats are NaN, bools False. Columns of
 ``truth`` exist only if a step has it.
 """
 
@@ -44,9 +44,14 @@ class Column:
         return self.path.rpartition(".")[2]
 
 
+_NO_QUANTITIES: Final = ("checksums", "marker_planes")
+
+
 def _columns(message: str = "Step", prefix: str = "") -> dict[str, Column]:
     found: dict[str, Column] = {}
     for field in MESSAGES[message]:
+        if field.name in _NO_QUANTITIES:
+            continue
         path = prefix + field.name
         if field.kind in MESSAGES:
             found |= _columns(field.kind, path + ".")

@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.Log_pb2 import Log as FoxgloveLog
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from tcrctl import __version__
-from tcrctl.log.codec import encode
+from tcrctl.log.codec import encode, encode_step
 from tcrctl.log.event import LEVELS, Event
 from tcrctl.log.geometry import LogGeometry
 from tcrctl.log.schema import VERSION, descriptor_set, public_descriptor, units
@@ -48,10 +48,12 @@ class McapFile:
         geometry: LogGeometry,
         epoch_ns: int,
         period_s: float,
+        full_state_s: float = 0.0,
     ) -> None:
         """Write everything that is known before the first step; see :class:`tcrctl.log.writer.LogWriter`."""
         self._stream, self._epoch_ns = stream, epoch_ns
         self._viewer = ViewerTopics(geometry, period_s)
+        self._full_every = max(1, round(full_state_s / period_s))
         self._writer: Any = new_mcap(stream)
         for name, (media_type, data) in attachments.items():
             self._writer.add_attachment(epoch_ns, epoch_ns, name, media_type, data)
@@ -108,7 +110,8 @@ class McapFile:
             measured = self.time_ns(record.measurement.t)
         except ValueError:  # nothing measured yet: the field keeps the value, the index needs a number
             measured = now
-        self._add(STEP_TOPIC, now, encode("Step", record), record.k, measured)
+        data = encode_step(record, full=record.k % self._full_every == 0)
+        self._add(STEP_TOPIC, now, data, record.k, measured)
         for topic, data in self._viewer.messages(record, now):
             self._add(topic, now, data, record.k, now)
         self.steps += 1

@@ -55,6 +55,7 @@ class LogWriter:
         flush_s: float = 0.5,
         flush_steps: int = 500,
         fsync: bool = False,
+        full_state_s: float = 0.0,
         wait_when_full: bool = False,
         opener: Callable[[Path], BinaryIO] = open_new,
     ) -> None:
@@ -70,6 +71,8 @@ class LogWriter:
             flush_s: A step is flushed at most this long after it was logged [s].
             flush_steps: At most this many steps are unflushed.
             fsync: Also wait at every flush until the disk has it (survives a power cut).
+            full_state_s: Time between two steps that are written in full [s]; 0: every step. See
+                :mod:`tcrctl.log.schema`.
             wait_when_full: Let :meth:`step` wait while the queue is full, instead of failing; for runs that
                 no clock paces.
             opener: Opens the file.
@@ -93,6 +96,7 @@ class LogWriter:
                 geometry=geometry,
                 epoch_ns=epoch_ns,
                 period_s=period_s,
+                full_state_s=full_state_s,
             )
         except Exception as error:
             with suppress(OSError):

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.log.checksums import checksums
 from tcrctl.log.columns import COLUMNS, Column
 from tcrctl.signals import StepRecord
 
 #: Parts of a step that are fed to the replay, or measured with a clock.
 _GIVEN: Final = ("k", "measurement.", "truth.", "timing.")
-#: What a log may hold of some steps only.
-_SPARSE: Final = ("estimate.q", "estimate.v", "estimate.disturbance")
+#: What a lean step leaves out; its checksum is compared instead.
+_SPARSE: Final = (
+    "estimate.q", "estimate.v", "estimate.disturbance", "info.predicted_tension", "info.integral"
+)  # fmt: skip
 _APPLIED: Final = "applied."
 
 FIELDS: Final[dict[str, Column]] = {
@@ -115,6 +118,7 @@ class Comparison:
             applied: Compare applied commands too.
         """
         self._atol, self._rtol = atol, rtol
+        self._tolerant = atol > 0.0 or rtol > 0.0
         self._fields = {
             path: (column, attrgetter(path))
             for path, column in FIELDS.items()
@@ -137,7 +141,23 @@ class Comparison:
                 self.first = self._difference(recorded.k, path, was, now)
             deviation = self.deviations.setdefault(path, Deviation(path, column.unit, recorded.k))
             deviation.add(_sizes(was, now))
-        self.different += differs
+        self.different += self._checksums_differ(recorded, replayed) or differs
+
+    def _checksums_differ(self, recorded: StepRecord, replayed: StepRecord) -> bool:
+        """Compare what a lean step leaves out, and see whether the input is what it was when it was logged."""
+        was = recorded.checksums
+        if was is None or self._tolerant:
+            return False
+        now = checksums(replace(replayed, measurement=recorded.measurement, reference=recorded.reference))
+        differs = False
+        for name, one, other in (("given", was.given, now.given), ("state", was.state, now.state)):
+            if one == other:
+                continue
+            differs, path = True, f"checksums.{name}"
+            if self.first is None:
+                self.first = Difference(recorded.k, path, f"{one:016x}", f"{other:016x}", None)
+            self.deviations.setdefault(path, Deviation(path, "", recorded.k)).add(np.zeros(0))
+        return differs
 
     def _same(self, was: Any, now: Any) -> bool:
         if isinstance(was, np.ndarray) and isinstance(now, np.ndarray):
@@ -151,7 +171,7 @@ class Comparison:
 
     def _close(self, was: Any, now: Any) -> Any:
         """True where a number is within the tolerance; bits of NaN do not count if there is one."""
-        if (self._atol == 0.0 and self._rtol == 0.0) or np.asarray(was).dtype != np.float64:
+        if not self._tolerant or np.asarray(was).dtype != np.float64:
             return _bits(was) == _bits(now)
         return np.isclose(now, was, rtol=self._rtol, atol=self._atol, equal_nan=True)
 

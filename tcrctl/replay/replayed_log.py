@@ -48,5 +48,6 @@ def open_replayed(out: Path, log: Log, origin: Origin, robot: Robot) -> LogWrite
         period_s=spec.controller.period_s,
         flush_s=spec.log.flush_s,
         flush_steps=spec.log.flush_steps,
+        full_state_s=spec.full_state_s,
         wait_when_full=True,
     )
