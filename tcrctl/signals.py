@@ -159,7 +159,7 @@ class Timing:
 
 @dataclass(frozen=True, slots=True)
 class Checksums:
-    """64-bit digests that stand for what a log leaves out, and that betray what was changed in it.
+    """32-bit digests that stand for what a log leaves out, and that betray what was changed in it.
 
     Attributes:
         given: Of measurement and reference.

@@ -27,8 +27,7 @@ from tcrctl.summary import TASK, UNITS
 from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.settings import TrajectorySettings
 
-
-#: With ``full_state_s: auto``, steps are logged in full at up to this control rate [Hz], and at higher ones once a second.
+#: Control rate up to which ``full_state_s: auto`` means every step [Hz].
 _RICH_RATE_HZ: Final = 20.0
 
 
@@ -40,8 +39,8 @@ class LogSettings(Settings):
     fsync: bool = Field(default=False, description="wait until the disk has the data, against power failure")
     full_state_s: Literal["auto"] | Annotated[float, Field(ge=0)] = quantity(
         "s",
-        "time between two steps with all node positions, velocities and forces (0: every step), which replay computes "
-        "again; auto: every step at up to 20 Hz, else 1 s",
+        "time between two steps with all node positions, velocities and forces (0: every step), which replay "
+        "computes again; auto: every step at up to 20 Hz, else 1 s",
         "auto",
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from hashlib import blake2b
+import zlib
 from operator import attrgetter
 from typing import Any, Final
 
@@ -25,15 +25,14 @@ _STATE: Final = attrgetter(
 def checksums(step: StepRecord) -> Checksums:
     """Digests of a step that has its full state.
 
-    Each is BLAKE2b with 8 bytes, little-endian, over the little-endian numbers of its fields in the order above; a
-    field that is None counts as the one byte 0xff.
+    Each is the CRC-32 (of zlib) over the little-endian numbers of its fields in the order above; a field that is
+    None counts as the one byte 0xff.
     """
     return Checksums(_digest(_GIVEN(step)), _digest(_STATE(step)))
 
 
 def _digest(values: tuple[Any, ...]) -> int:
-    data = b"".join(_bytes(value) for value in values)
-    return int.from_bytes(blake2b(data, digest_size=8).digest(), "little")
+    return zlib.crc32(b"".join(_bytes(value) for value in values))
 
 
 def _bytes(value: Any) -> bytes:

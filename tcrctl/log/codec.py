@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.log.checksums import checksums
 from tcrctl.log.event import Event
-from tcrctl.log.schema import MESSAGES, OPAQUE, SCALARS, SPARSE, Field, wire_class
+from tcrctl.log.schema import MESSAGES, OPAQUE, SCALARS, Field, wire_class
 from tcrctl.signals import (
     Checksums,
     Command,
@@ -42,8 +40,9 @@ _DTYPES: Final[dict[str, np.dtype[Any]]] = {
     "float[]": np.dtype("<f4"),
     "bool[]": np.dtype(np.bool_),
 }
-_NOTHING: Final[frozenset[tuple[str, str]]] = frozenset()
-_LEAN: Final = SPARSE | {("Measurement", "nodes")}
+
+Fields: TypeAlias = frozenset[tuple[str, str]]
+"""Fields of message types, each as name of the type and of the field."""
 
 
 def encode(name: str, record: object) -> bytes:
@@ -53,45 +52,21 @@ def encode(name: str, record: object) -> bytes:
         ValueError: If an array has another dtype or dimension than the schema says; a silent cast would make
             the log differ from what the controller saw.
     """
-    message = _WIRE[name]()
-    _fill(message, name, record)
-    return bytes(message.SerializeToString())
+    return bytes(filled(name, record).SerializeToString())
 
 
-def encode_step(step: StepRecord, *, full: bool = True) -> bytes:
-    """Encode a step with its checksums, in full or lean; see :mod:`tcrctl.log.schema`.
-
-    Args:
-        step: The step, with its full state.
-        full: Write the full state too.
+def filled(name: str, record: object, omitted: Fields = frozenset()) -> Any:
+    """Message of type ``name`` with the values of a record, but those of the fields ``omitted``.
 
     Raises:
         ValueError: As :func:`encode`.
     """
-    message = _WIRE["Step"]()
-    _fill(message, "Step", step, _NOTHING if full else _LEAN)
-    _fill(message.checksums, "Checksums", checksums(step))
-    if not full:
-        message.marker_planes = planes(step.measurement.nodes)
-    return bytes(message.SerializeToString())
+    message = _WIRE[name]()
+    _fill(message, name, record, omitted)
+    return message
 
 
-def planes(nodes: NDArray[np.float32]) -> bytes:
-    """Bytes of all coordinates (n, 3) by significance, the lowest of all first: (4, 3 n)."""
-    return np.ascontiguousarray(nodes, "<f4").view(np.uint8).reshape(-1, 4).T.tobytes()
-
-
-def from_planes(data: bytes) -> NDArray[np.float32]:
-    """Inverse of :func:`planes`.
-
-    Raises:
-        ValueError: If the number of bytes does not make whole markers.
-    """
-    sorted_bytes = np.frombuffer(data, np.uint8).reshape(4, -1)
-    return np.ascontiguousarray(sorted_bytes.T).view("<f4").reshape(-1, 3)
-
-
-def _fill(message: Any, name: str, record: object, omitted: frozenset[tuple[str, str]] = _NOTHING) -> None:
+def _fill(message: Any, name: str, record: object, omitted: Fields) -> None:
     for field in MESSAGES[name]:
         if field.kind == OPAQUE or (name, field.name) in omitted:
             continue
@@ -125,23 +100,16 @@ def decode(name: str, data: bytes) -> Any:
     Raises:
         google.protobuf.message.DecodeError: If ``data`` is not such a message.
     """
-    return _record(_WIRE[name].FromString(data), name)
+    return record_of(parsed(name, data), name)
 
 
-def decode_step(data: bytes) -> StepRecord:
-    """Decode a ``/tcrctl/step`` message; its arrays are writable copies, equal bit for bit.
-
-    Arrays that a lean step leaves out are empty.
+def parsed(name: str, data: bytes) -> Any:
+    """Message of type ``name``, arrays as bytes.
 
     Raises:
         google.protobuf.message.DecodeError: If ``data`` is not such a message.
-        ValueError: If an array in it is no whole number of values.
     """
-    message = _WIRE["Step"].FromString(data)
-    step: StepRecord = _record(message, "Step")
-    if not message.marker_planes:
-        return step
-    return replace(step, measurement=replace(step.measurement, nodes=from_planes(message.marker_planes)))
+    return _WIRE[name].FromString(data)
 
 
 def decode_event(data: bytes) -> Event:
@@ -150,7 +118,12 @@ def decode_event(data: bytes) -> Event:
     return event
 
 
-def _record(message: Any, name: str) -> Any:
+def record_of(message: Any, name: str) -> Any:
+    """Record with the values of a parsed message of type ``name``.
+
+    Raises:
+        ValueError: If an array in it is no whole number of values.
+    """
     values = {field.name: _value(message, field) for field in MESSAGES[name] if field.kind != OPAQUE}
     return _RECORDS[name](**values)
 
@@ -162,6 +135,6 @@ def _value(message: Any, field: Field) -> Any:
     if field.kind in SCALARS:
         return value
     if field.kind not in _DTYPES:
-        return _record(value, field.kind)
+        return record_of(value, field.kind)
     array: NDArray[Any] = np.frombuffer(value, _DTYPES[field.kind]).copy()
     return array.reshape(-1, field.width) if field.width else array

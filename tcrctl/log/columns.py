@@ -44,7 +44,7 @@ class Column:
         return self.path.rpartition(".")[2]
 
 
-_NO_QUANTITIES: Final = ("checksums", "marker_planes")
+_NO_QUANTITIES: Final = ("checksums", "marker_planes", "marker_changes")
 
 
 def _columns(message: str = "Step", prefix: str = "") -> dict[str, Column]:

@@ -11,10 +11,11 @@ from foxglove_schemas_protobuf.Log_pb2 import Log as FoxgloveLog
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from tcrctl import __version__
-from tcrctl.log.codec import encode, encode_step
+from tcrctl.log.codec import encode
 from tcrctl.log.event import LEVELS, Event
 from tcrctl.log.geometry import LogGeometry
 from tcrctl.log.schema import VERSION, descriptor_set, public_descriptor, units
+from tcrctl.log.steps import StepEncoder
 from tcrctl.log.viewer_topics import TOPICS, ViewerTopics, stamp
 from tcrctl.signals import StepRecord
 
@@ -28,10 +29,13 @@ LIBRARY: Final = f"tcrctl/{__version__} {LIBRARY_IDENTIFIER}"
 Attachments = Mapping[str, tuple[str, bytes]]
 
 
-def new_mcap(stream: IO[bytes]) -> Writer:
-    """Writer with the header of our logs, zstd chunks of at most 1 MiB."""
+_CHUNK_BYTES: Final = 2**20
+
+
+def new_mcap(stream: IO[bytes], chunk_size: int = _CHUNK_BYTES) -> Writer:
+    """Writer with the header of our logs; ends a zstd chunk by itself when it is longer than ``chunk_size``."""
     # Offsets into the summary are optional, and mcap writes wrong ones for groups without entries.
-    writer = Writer(stream, compression=CompressionType.ZSTD, use_summary_offsets=False)
+    writer = Writer(stream, chunk_size, CompressionType.ZSTD, use_summary_offsets=False)
     writer.start(profile="", library=LIBRARY)
     return writer
 
@@ -53,8 +57,10 @@ class McapFile:
         """Write everything that is known before the first step; see :class:`tcrctl.log.writer.LogWriter`."""
         self._stream, self._epoch_ns = stream, epoch_ns
         self._viewer = ViewerTopics(geometry, period_s)
-        self._full_every = max(1, round(full_state_s / period_s))
-        self._writer: Any = new_mcap(stream)
+        self._encoder = StepEncoder(max(1, round(full_state_s / period_s)))
+        # Chunks end in flush() only, which lets the encoder begin anew.
+        self._writer: Any = new_mcap(stream, chunk_size=2**62)
+        self._chunk = 0
         for name, (media_type, data) in attachments.items():
             self._writer.add_attachment(epoch_ns, epoch_ns, name, media_type, data)
         own = {"log_schema": VERSION, "epoch_ns": str(epoch_ns), "period_s": repr(period_s)}
@@ -105,13 +111,14 @@ class McapFile:
 
     def step(self, record: StepRecord) -> None:
         """Write a step and the viewer topics due at it."""
+        if self._chunk >= _CHUNK_BYTES:
+            self.flush()
         now = self.time_ns(record.t)
         try:
             measured = self.time_ns(record.measurement.t)
         except ValueError:  # nothing measured yet: the field keeps the value, the index needs a number
             measured = now
-        data = encode_step(record, full=record.k % self._full_every == 0)
-        self._add(STEP_TOPIC, now, data, record.k, measured)
+        self._add(STEP_TOPIC, now, self._encoder.encode(record), record.k, measured)
         for topic, data in self._viewer.messages(record, now):
             self._add(topic, now, data, record.k, now)
         self.steps += 1
@@ -128,11 +135,14 @@ class McapFile:
         self.unflushed += 1
 
     def _add(self, topic: str, log_time: int, data: bytes, sequence: int, publish_time: int) -> None:
+        self._chunk += len(data)
         self._writer.add_message(self._channels[topic], log_time, data, publish_time, sequence % 2**32)
 
     def flush(self, *, to_disk: bool = False) -> None:
         """End the chunk and hand it to the operating system, and to the disk if ``to_disk``."""
         self._writer.flush()
+        self._encoder.restart()
+        self._chunk = 0
         if to_disk:
             getattr(os, "fdatasync", os.fsync)(self._stream.fileno())
         self.unflushed = 0

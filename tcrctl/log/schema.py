@@ -5,10 +5,11 @@ declares an array as ``repeated double``. The *wire* one, used by our codec, dec
 ``bytes``: a packed repeated field and a bytes field are both length-delimited, so an array is copied whole,
 NaN payloads included, instead of number by number.
 
-A step is written *in full* or *lean*. A lean step leaves out the fields of ``SPARSE``: node positions, velocities and
-forces, which replay computes again, and of which it holds 64-bit digests (``checksums``). Its markers, which are
-input and cannot be left out, are in ``marker_planes``: the bytes of ``measurement.nodes`` sorted by significance,
-(4, 3 n_markers), which the compressor shortens by a third. How often a step is full is ``log.full_state_s``.
+A step is written *in full* or *lean*. A lean step leaves out the fields of ``SPARSE``: node positions, velocities
+and forces, which replay computes again, and of which it holds digests (``checksums``). Its markers are input
+and cannot be left out; they are in ``marker_planes`` or ``marker_changes`` instead of ``measurement.nodes``, in a
+form that the compressor can shorten by a third (:mod:`tcrctl.log.steps`). How often a step is full is
+``log.full_state_s``.
 """
 
 from __future__ import annotations
@@ -122,6 +123,7 @@ MESSAGES: Final[dict[str, tuple[Field, ...]]] = {
         Field("timing", "Timing"),
         Field("checksums", "Checksums", optional=True),
         Field("marker_planes", "bytes"),
+        Field("marker_changes", "bytes"),
     ),
     "Checksums": (
         Field("given", "uint64"),

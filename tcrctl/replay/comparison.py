@@ -155,7 +155,7 @@ class Comparison:
                 continue
             differs, path = True, f"checksums.{name}"
             if self.first is None:
-                self.first = Difference(recorded.k, path, f"{one:016x}", f"{other:016x}", None)
+                self.first = Difference(recorded.k, path, f"{one:08x}", f"{other:08x}", None)
             self.deviations.setdefault(path, Deviation(path, "", recorded.k)).add(np.zeros(0))
         return differs
 
