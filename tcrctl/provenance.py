@@ -52,13 +52,14 @@ def versions() -> dict[str, str]:
     """Versions of everything that the numbers of a run depend on, and a digest of this program's source."""
     import llvmlite.binding as llvm  # heavy
 
+    cpu = llvm.get_host_cpu_name()  # type: ignore[no-untyped-call]  # decides what kernels are compiled to
     found = {
         "tcrctl": __version__,
         "source_sha256": source_digest(),
         "python": sys.version.split()[0],
         "platform": platform.platform(),
         "processor": processor(),
-        "cpu": llvm.get_host_cpu_name(),  # decides which code the kernels are compiled to
+        "cpu": cpu,
         "numba_opt": os.environ.get("NUMBA_OPT", "default"),
     }
     for package in _PACKAGES:

@@ -3,6 +3,10 @@
 control thread -- step(record) --> queue --> writer thread: encode, compress, flush --> file
 
 Only the writer thread touches the file once the constructor has returned.
+
+Two threads of a Python program hinder each other while both have something to do. A paced run has gaps between its
+steps, in which the log is written. A run that no clock paces has none; there they take turns: the steps wait in the
+queue until there are some dozens, then the control thread waits until all are written.
 """
 
 from __future__ import annotations
@@ -26,6 +30,7 @@ from tcrctl.signals import StepRecord
 
 _QUEUE_S: Final = 2.0  # a writer that lags further behind will not catch up: the disk is too slow
 _QUEUE_MIN_STEPS: Final = 1000
+_TURN_STEPS: Final = 64  # of an unpaced run between two turns of the writer thread
 _POLL_S: Final = 1.0  # how often an idle writer looks whether the main thread still lives
 
 
@@ -73,8 +78,8 @@ class LogWriter:
             fsync: Also wait at every flush until the disk has it (survives a power cut).
             full_state_s: Time between two steps that are written in full [s]; 0: every step. See
                 :mod:`tcrctl.log.schema`.
-            wait_when_full: Let :meth:`step` wait while the queue is full, instead of failing; for runs that
-                no clock paces.
+            wait_when_full: Let :meth:`step` wait for the writer thread from time to time, instead of failing when
+                it lags; for runs that no clock paces.
             opener: Opens the file.
 
         Raises:
@@ -85,6 +90,8 @@ class LogWriter:
         self._wait_when_full = wait_when_full
         self._limit = max(_QUEUE_MIN_STEPS, math.ceil(_QUEUE_S / period_s))
         self._queue: SimpleQueue[StepRecord | Event | dict[str, str]] = SimpleQueue()
+        self._turn, self._written = threading.Event(), threading.Event()
+        self._in_turn = 0
         self._failure: Exception | None = None
         self._finished = False
         self._stream = _create(self.path, opener)
@@ -113,9 +120,13 @@ class LogWriter:
             LogError: If the writer thread failed (disk full), is too slow, or the log is finished.
         """
         self._check()
-        if self._queue.qsize() >= self._limit:
-            self._overflow()
+        if self._queue.qsize() >= self._limit and not self._wait_when_full:
+            text = f"the disk is too slow: {self._limit} steps are waiting to be written"
+            raise LogError(self.path, text, hint="Log to a faster disk or lower the control rate.")
         self._queue.put(record)
+        self._in_turn += 1
+        if self._wait_when_full and self._in_turn >= _TURN_STEPS:
+            self._let_write()
 
     def event(self, t: float, kind: str, level: str, message: str) -> None:
         """Log an event at time ``t`` [s]; see :class:`tcrctl.log.event.Event`.
@@ -136,6 +147,7 @@ class LogWriter:
         self._check()
         self._finished = True
         self._queue.put(dict(stop))
+        self._turn.set()
         self._thread.join()
         if self._failure is not None:
             raise self._error(self._failure) from self._failure
@@ -170,13 +182,14 @@ class LogWriter:
         hint = f"Everything up to the last flush is readable: tcrctl recover {self.path}"
         return LogError(self.path, f"writing failed: {failure}", hint=hint)
 
-    def _overflow(self) -> None:
-        while self._wait_when_full and self._queue.qsize() >= self._limit:
-            time.sleep(0.001)
-            self._check()
-        if not self._wait_when_full:
-            text = f"the disk is too slow: {self._limit} steps are waiting to be written"
-            raise LogError(self.path, text, hint="Log to a faster disk or lower the control rate.")
+    def _let_write(self) -> None:
+        """Give the writer thread its turn, and wait until it has written everything."""
+        self._in_turn = 0
+        self._written.clear()
+        self._turn.set()
+        while not self._written.wait(_POLL_S) and self._thread.is_alive():
+            pass
+        self._check()
 
     def _run(self) -> None:
         """Body of the writer thread."""
@@ -188,6 +201,7 @@ class LogWriter:
             self._stream.close()
         except OSError as failure:
             self._failure = self._failure or failure
+        self._written.set()
 
     def _write_until_stop(self) -> None:
         flush_at = math.inf
@@ -206,13 +220,19 @@ class LogWriter:
 
     def _next(self, flush_at: float) -> StepRecord | Event | dict[str, str] | None:
         """Next item; None if a flush is due or nothing came for a while."""
-        wait = min(_POLL_S, max(0.0, flush_at - time.monotonic()))
-        try:
-            return self._queue.get(timeout=wait) if wait > 0.0 else self._queue.get_nowait()
-        except Empty:
-            if not self._finished and not threading.main_thread().is_alive():
-                return {"status": "error", "reason": "the program ended without finishing the log"}
-            return None
+        with suppress(Empty):
+            return self._queue.get_nowait()
+        self._written.set()
+        wait = max(0.0, min(_POLL_S, flush_at - time.monotonic()))
+        if self._wait_when_full:  # what is logged outside a turn waits half a flush interval at most
+            self._turn.wait(min(wait, 0.5 * self._flush_s))
+            self._turn.clear()
+        else:
+            with suppress(Empty):
+                return self._queue.get(timeout=wait) if wait > 0.0 else None
+        if not self._finished and not threading.main_thread().is_alive():
+            return {"status": "error", "reason": "the program ended without finishing the log"}
+        return None
 
     def _flush_if_due(self, flush_at: float) -> float:
         """Flush if it is time to; return when the next flush is due on the monotonic clock [s]."""
@@ -222,7 +242,7 @@ class LogWriter:
         if now >= flush_at or self._file.unflushed >= self._flush_steps:
             self._file.flush(to_disk=self._fsync)
             return math.inf
-        return min(flush_at, now + self._flush_s)
+        return min(flush_at, now + (0.5 if self._wait_when_full else 1.0) * self._flush_s)
 
 
 def _create(path: Path, opener: Callable[[Path], BinaryIO]) -> BinaryIO:
