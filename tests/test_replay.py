@@ -15,10 +15,10 @@ from short_runs import short_spec
 from tcrctl.cli.app import main
 from tcrctl.errors import InputError, LogError
 from tcrctl.experiment import prepare
+from tcrctl.log.comparison import Comparison, Difference, quantities
 from tcrctl.log.reader import read_log
 from tcrctl.log.recover import recover
 from tcrctl.log.writer import LogWriter
-from tcrctl.replay.comparison import Comparison, Difference
 from tcrctl.replay.replay import Tolerance, Window, replay
 from tcrctl.run import log_geometry, run_experiment
 from tcrctl.run_folder import RESOLVED
@@ -281,23 +281,23 @@ def test_differences_of_bits_are_seen_where_values_are_equal():
     a, b = record(1), record(1)
     a.wanted.speed[:] = 0.0
     b.wanted.speed[:] = [0.0, -0.0, 0.0]
-    comparison = Comparison(0.0, 0.0, applied=True)
+    comparison = Comparison(quantities())
     comparison.add(a, b)
     assert comparison.first == Difference(1, "wanted.speed[1]", 0.0, -0.0, 1)
     a.wanted.speed[:] = b.wanted.speed[:] = np.nan
-    same = Comparison(0.0, 0.0, applied=True)
+    same = Comparison(quantities())
     same.add(a, b)
     assert same.first is None
 
 
 def test_ulps_count_the_numbers_between():
-    from tcrctl.replay.comparison import _ulps
+    from tcrctl.log.comparison import ulps
 
-    assert _ulps(1.0, math.nextafter(1.0, 2.0)) == 1
-    assert _ulps(5e-324, -5e-324) == 3  # -0.0 and 0.0 lie between
-    assert _ulps(1.0, 2.0) == 2**52
-    assert _ulps(1.0, math.inf) is None
-    assert _ulps(True, False) is None
+    assert ulps(1.0, math.nextafter(1.0, 2.0)) == 1
+    assert ulps(5e-324, -5e-324) == 3  # -0.0 and 0.0 lie between
+    assert ulps(1.0, 2.0) == 2**52
+    assert ulps(1.0, math.inf) is None
+    assert ulps(True, False) is None
 
 
 def test_the_command_prints_one_object_and_exits_0_or_3(logs, capsys):

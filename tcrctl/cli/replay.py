@@ -91,7 +91,7 @@ def _print(found: Replay) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from tcrctl.replay.comparison import table
+    from tcrctl.log.comparison import table
 
     console = Console()
     facts = Table(show_header=False, box=None)

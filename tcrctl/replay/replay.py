@@ -18,12 +18,13 @@ from tcrctl.controller.controller import Controller, build_controller
 from tcrctl.errors import InputError, StoppedError
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.experiment import Experiment
+from tcrctl.log.checksums import checksums
+from tcrctl.log.comparison import Comparison, Deviation, Difference, quantities
 from tcrctl.log.reader import Log, read_log
 from tcrctl.loop import run_loop
 from tcrctl.pacing import Unpaced
 from tcrctl.plant.recorded import Limits, Recorded, RecordingEndedError
 from tcrctl.plant.stroke import within_stroke
-from tcrctl.replay.comparison import Comparison, Deviation, Difference
 from tcrctl.replay.environment import Change, changes
 from tcrctl.replay.rebuild import Origin, rebuild
 from tcrctl.replay.replayed_log import open_replayed
@@ -42,6 +43,8 @@ LIMITS: Final[Mapping[str, Callable[[Robot, float], Limits]]] = {
         lambda command, measured: within_stroke(command, measured.drive, period, robot.stroke)
     ),
 }
+#: Parts of a step that are fed to the replay, or measured with a clock.
+GIVEN: Final = ("k", "measurement.", "truth.", "timing.")
 #: Stops nothing: a changed controller may fail where the recorded one did not, and the replay shall go on.
 NO_LIMITS: Final = SafetyLimits(np.inf, np.inf, 2**62)
 
@@ -187,7 +190,8 @@ class _Session:
         self._kind, self._period = spec.plant.kind, float(spec.controller.period_s)
         self.robot = build_robot(origin.wanted.robot)
         limits = LIMITS[self._kind](self.robot, self._period) if self._kind in LIMITS else None
-        self._comparison = Comparison(tolerance.atol, tolerance.rtol, applied=limits is not None)
+        unknown = () if limits is not None else ("applied.",)
+        self._comparison = Comparison(quantities(*GIVEN, *unknown), tolerance.atol, tolerance.rtol)
         self._steps, first = _peeked(log.steps())
         self._plant = Recorded(self._steps, limits)
         self._controller = build_controller(spec.controller, self.robot)
@@ -216,6 +220,9 @@ class _Session:
         def take(step: StepRecord) -> None:
             recorded, limited = self._plant.step, self._plant.limited
             replayed = step if limited is None else replace(step, applied=limited)
+            # of the recorded input, which may differ from what it was when it was logged
+            fed = replace(replayed, measurement=recorded.measurement, reference=recorded.reference)
+            replayed = replace(replayed, checksums=checksums(fed))
             self._done += 1
             if step.k in self._window:
                 self._comparison.add(recorded, replayed)

@@ -1,32 +1,33 @@
-"""Recorded and replayed steps held against each other: the first difference, and how large all of them are."""
+"""Pairs of steps held against each other: the first difference, and how large all of them are."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.log.checksums import checksums
 from tcrctl.log.columns import COLUMNS, Column
 from tcrctl.signals import StepRecord
 
-#: Parts of a step that are fed to the replay, or measured with a clock.
-_GIVEN: Final = ("k", "measurement.", "truth.", "timing.")
 #: What a lean step leaves out; its checksum is compared instead.
 _SPARSE: Final = (
-    "estimate.q", "estimate.v", "estimate.disturbance", "info.predicted_tension", "info.integral"
+    "estimate.q", "estimate.v", "estimate.disturbance", "info.predicted_tension", "info.integral", "truth.q"
 )  # fmt: skip
-_APPLIED: Final = "applied."
 
-FIELDS: Final[dict[str, Column]] = {
-    column.path: column for column in COLUMNS.values() if not column.path.startswith(_GIVEN)
-}
-"""Compared quantities by path in the step, in the order in which they come about."""
+
+def quantities(*left_out: str) -> dict[str, Column]:
+    """Quantities of a step by path, in the order in which they come about; without parts ``left_out``.
+
+    Args:
+        *left_out: How the paths of what is left out begin.
+    """
+    return {column.path: column for column in COLUMNS.values() if not column.path.startswith(left_out)}
+
 
 Value = float | int | bool | str
 
@@ -109,21 +110,17 @@ class Comparison:
         deviations: Deviation by path, only of what differs.
     """
 
-    def __init__(self, atol: float, rtol: float, *, applied: bool) -> None:
+    def __init__(self, columns: Mapping[str, Column], atol: float = 0.0, rtol: float = 0.0) -> None:
         """Compare by bytes, unless a tolerance is given.
 
         Args:
+            columns: What is compared, by path.
             atol: Absolute difference that counts as none, in the unit of each quantity.
             rtol: The same, as part of the recorded value.
-            applied: Compare applied commands too.
         """
         self._atol, self._rtol = atol, rtol
         self._tolerant = atol > 0.0 or rtol > 0.0
-        self._fields = {
-            path: (column, attrgetter(path))
-            for path, column in FIELDS.items()
-            if applied or not path.startswith(_APPLIED)
-        }
+        self._fields = {path: (column, attrgetter(path)) for path, column in columns.items()}
         self.steps = self.different = 0
         self.first: Difference | None = None
         self.deviations: dict[str, Deviation] = {}
@@ -133,8 +130,8 @@ class Comparison:
         self.steps += 1
         differs = False
         for path, (column, get) in self._fields.items():
-            was, now = get(recorded), get(replayed)
-            if self._same(was, now) or (path in _SPARSE and not was.size):
+            was, now = _get(get, recorded), _get(get, replayed)
+            if self._same(was, now) or (path in _SPARSE and _is_left_out(was, now)):
                 continue
             differs = True
             if self.first is None:
@@ -144,11 +141,10 @@ class Comparison:
         self.different += self._checksums_differ(recorded, replayed) or differs
 
     def _checksums_differ(self, recorded: StepRecord, replayed: StepRecord) -> bool:
-        """Compare what a lean step leaves out, and see whether the input is what it was when it was logged."""
-        was = recorded.checksums
-        if was is None or self._tolerant:
+        """Compare what a lean step leaves out, and see whether its input is as it was when it was logged."""
+        was, now = recorded.checksums, replayed.checksums
+        if was is None or now is None or self._tolerant:
             return False
-        now = checksums(replace(replayed, measurement=recorded.measurement, reference=recorded.reference))
         differs = False
         for name, one, other in (("given", was.given, now.given), ("state", was.state, now.state)):
             if one == other:
@@ -177,13 +173,25 @@ class Comparison:
 
     def _difference(self, k: int, path: str, was: Any, now: Any) -> Difference:
         if not (isinstance(was, np.ndarray) and isinstance(now, np.ndarray)):
-            return Difference(k, path, _value(was), _value(now), _ulps(was, now))
+            return Difference(k, path, _value(was), _value(now), ulps(was, now))
         if was.shape != now.shape:
             return Difference(k, path, f"shape {was.shape}", f"shape {now.shape}", None)
         index = np.unravel_index(int(np.flatnonzero(~self._close(was, now))[0]), was.shape)
         label = ",".join(str(int(i)) for i in index)
         one, other = was[index].item(), now[index].item()
-        return Difference(k, f"{path}[{label}]", one, other, _ulps(one, other))
+        return Difference(k, f"{path}[{label}]", one, other, ulps(one, other))
+
+
+def _get(get: Callable[[StepRecord], Any], step: StepRecord) -> Any:
+    """Value of a step; None if the record that it belongs to is lacking."""
+    try:
+        return get(step)
+    except AttributeError:
+        return None
+
+
+def _is_left_out(was: Any, now: Any) -> bool:
+    return was is not None and now is not None and not (was.size and now.size)
 
 
 def _bits(values: Any) -> Any:
@@ -191,7 +199,7 @@ def _bits(values: Any) -> Any:
     return array.view(np.int64) if array.dtype == np.float64 else array
 
 
-def _ulps(one: Any, other: Any) -> int | None:
+def ulps(one: Any, other: Any) -> int | None:
     """Representable numbers between two finite floats; None for anything else."""
     if not (
         isinstance(one, float) and isinstance(other, float) and math.isfinite(one) and math.isfinite(other)
