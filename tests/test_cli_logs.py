@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.recover import recover
 from tcrctl.errors import InputError, LogError, TcrctlError
-from tcrctl.export import export_csv
+from tcrctl.export import export_csv, export_parquet
 from tcrctl.info import inspect
 from tcrctl.log.columns import COLUMNS
 from tcrctl.log.reader import read_log
@@ -192,6 +193,25 @@ def test_an_npz_holds_every_quantity_as_logged(log):
             step = records.record(k)
             assert arrays["truth_q_m"][k].tobytes() == step.truth.q.tobytes()
             assert arrays["measurement_nodes_m"][k].tobytes() == step.measurement.nodes.tobytes()
+
+
+def test_a_parquet_file_has_the_columns_and_bits_of_the_csv(log, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    assert tcrctl("export", log, "--parquet", "--nodes")[0] == 0
+    table = parquet.read_table(log.with_suffix(".parquet"))
+    assert table.column_names == export_csv(log, tmp_path / "all.csv", nodes=True)
+    for name, expected in (("t_s", lambda s: s.t), ("applied_speed_c2_m_s", lambda s: s.applied.speed[1])):
+        assert table[name].to_pylist() == [expected(records.record(k)) for k in range(N_STEPS)]
+    assert str(table.schema.field("measurement_nodes_m1_n1_x_m").type) == "float"
+    assert str(table.schema.field("info_saturated_c1").type) == "bool"
+
+
+def test_parquet_without_its_package_names_what_to_install(log, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(InputError, match="pyarrow") as caught:
+        export_parquet(log, log.with_suffix(".parquet"))
+    assert "tcrctl[parquet]" in caught.value.hint
+    assert not log.with_suffix(".parquet").exists()
 
 
 def test_an_unfinished_log_exports_what_it_has(cut, tmp_path):

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from tcrctl import __version__
+from tcrctl.cli.diff import diff
 from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
@@ -35,6 +36,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "recover": recover,
     "export": export,
     "replay": replay,
+    "diff": diff,
 }
 
 

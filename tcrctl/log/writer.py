@@ -44,8 +44,8 @@ class LogWriter:
 
     The file is created, and its attachments and start metadata written, before the constructor returns: a bad
     folder is found before the robot moves. From then on a writer thread owns the file. Whatever ends the
-    ``with`` body, the file gets a stop record; without one (kill -9, power cut) it is readable up to the last
-    flush.
+    ``with`` body, the file gets a stop record, even if the disk is full; without one (kill -9, power cut) it is
+    readable up to the last flush.
     """
 
     def __init__(
@@ -197,11 +197,21 @@ class LogWriter:
             self._write_until_stop()
         except Exception as failure:
             self._failure = failure
+            self._end_after(failure)
         try:
             self._stream.close()
         except OSError as failure:
             self._failure = self._failure or failure
         self._written.set()
+
+    def _end_after(self, failure: Exception) -> None:
+        """Say in the file why it ends; what was flushed stays readable even if that fails too."""
+        stop = {"status": "error", "reason": f"writing failed: {failure}"}
+        with suppress(Exception):
+            if isinstance(failure, OSError):
+                self._file.cut_short(self.path, stop)
+            else:
+                self._file.finish(stop)
 
     def _write_until_stop(self) -> None:
         flush_at = math.inf
