@@ -61,17 +61,17 @@ def test_settings_are_compared_one_by_one(a, tmp_path):
 def test_one_ulp_in_one_column_is_found_with_its_step_and_size(a, tmp_path, capsys):
     def nudge(step):
         if step.k in (12, 20):
-            step.truth.tension[1] = np.nextafter(step.truth.tension[1], np.inf)
+            step.truth.position[1] = np.nextafter(step.truth.position[1], np.inf)
 
     b = write(tmp_path / "b.mcap", change=nudge)
     found = diff(a, b)
     (deviation,) = found.deviations
-    assert (deviation.field, deviation.first_step, deviation.steps) == ("truth.tension", 12, 2)
+    assert (deviation.field, deviation.first_step, deviation.steps) == ("truth.position", 12, 2)
     assert 0.0 < deviation.largest < 1e-14
     assert main(["diff", str(a), str(b), "--json"]) == 3
     printed = json.loads(capsys.readouterr().out)
     assert printed["status"] == "different"
-    assert printed["first_difference"]["field"] == "truth.tension[1]"
+    assert printed["first_difference"]["field"] == "truth.position[1]"
     assert printed["first_difference"]["step"] == 12
     assert printed["first_difference"]["ulps"] == 1
     assert printed["first_difference"]["a"] < printed["first_difference"]["b"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import io
 import os
-import subprocess
 import threading
 import time
 
@@ -103,22 +102,6 @@ def test_a_disk_too_full_to_start_leaves_nothing_behind(tmp_path):
     with pytest.raises(LogError, match="No space left"):
         open_log(path, opener=full_disk(500))
     assert not path.exists()
-
-
-@pytest.fixture
-def tiny_filesystem(tmp_path):
-    """A real file system of 256 KiB, where mounting one is allowed."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(folder)]
-    try:
-        mounted = subprocess.run(command, capture_output=True, check=False).returncode == 0
-    except OSError:
-        mounted = False
-    if not mounted:
-        pytest.skip("a file system can be mounted by root only")
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
 
 
 def test_a_really_full_file_system_stops_the_run_and_keeps_what_was_flushed(

@@ -30,7 +30,7 @@ from tcrctl.signals import StepRecord
 
 _QUEUE_S: Final = 2.0  # a writer that lags further behind will not catch up: the disk is too slow
 _QUEUE_MIN_STEPS: Final = 1000
-_TURN_STEPS: Final = 64  # of an unpaced run between two turns of the writer thread
+_TURN_STEPS: Final = 64  # most steps of an unpaced run between two turns of the writer thread
 _POLL_S: Final = 1.0  # how often an idle writer looks whether the main thread still lives
 
 
@@ -88,6 +88,7 @@ class LogWriter:
         self.path = Path(path)
         self._flush_s, self._flush_steps, self._fsync = flush_s, flush_steps, fsync
         self._wait_when_full = wait_when_full
+        self._turn_steps = min(_TURN_STEPS, max(1, flush_steps // 2)) if wait_when_full else 0
         self._limit = max(_QUEUE_MIN_STEPS, math.ceil(_QUEUE_S / period_s))
         self._queue: SimpleQueue[StepRecord | Event | dict[str, str]] = SimpleQueue()
         self._turn, self._written = threading.Event(), threading.Event()
@@ -125,7 +126,7 @@ class LogWriter:
             raise LogError(self.path, text, hint="Log to a faster disk or lower the control rate.")
         self._queue.put(record)
         self._in_turn += 1
-        if self._wait_when_full and self._in_turn >= _TURN_STEPS:
+        if self._wait_when_full and self._in_turn >= self._turn_steps:
             self._let_write()
 
     def event(self, t: float, kind: str, level: str, message: str) -> None:
@@ -248,8 +249,11 @@ class LogWriter:
         """Flush if it is time to; return when the next flush is due on the monotonic clock [s]."""
         if self._file.unflushed == 0:
             return math.inf
-        now = time.monotonic()
-        if now >= flush_at or self._file.unflushed >= self._flush_steps:
+        now, room = (
+            time.monotonic(),
+            max(1, self._flush_steps - self._turn_steps),
+        )  # steps may wait for a turn
+        if now >= flush_at or self._file.unflushed >= room:
             self._file.flush(to_disk=self._fsync)
             return math.inf
         return min(flush_at, now + (0.5 if self._wait_when_full else 1.0) * self._flush_s)
