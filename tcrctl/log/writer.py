@@ -73,7 +73,8 @@ class LogWriter:
             geometry: Names and topology of the robot.
             epoch_ns: Unix time of t = 0 [ns].
             period_s: Control period [s].
-            flush_s: A step is flushed at most this long after it was logged [s].
+            flush_s: A step is flushed at most this long after it was logged [s]; in a run that no clock paces, this
+                much of the run's own time counts if it takes longer.
             flush_steps: At most this many steps are unflushed.
             fsync: Also wait at every flush until the disk has it (survives a power cut).
             full_state_s: Time between two steps that are written in full [s]; 0: every step. See
@@ -88,13 +89,16 @@ class LogWriter:
         self.path = Path(path)
         self._flush_s, self._flush_steps, self._fsync = flush_s, flush_steps, fsync
         self._wait_when_full = wait_when_full
-        self._turn_steps = min(_TURN_STEPS, max(1, flush_steps // 2)) if wait_when_full else 0
+        self._least, self._turn_steps = 1, 0
+        if wait_when_full:  # on a slow machine too a chunk shall be worth compressing
+            self._least = max(1, math.ceil(flush_s / period_s - 1e-9))
+            self._turn_steps = max(1, min(_TURN_STEPS, flush_steps // 2, self._least // 2))
         self._limit = max(_QUEUE_MIN_STEPS, math.ceil(_QUEUE_S / period_s))
         self._queue: SimpleQueue[StepRecord | Event | dict[str, str]] = SimpleQueue()
         self._turn, self._written = threading.Event(), threading.Event()
         self._in_turn = 0
         self._failure: Exception | None = None
-        self._finished = False
+        self._finished = self._reported = False
         self._stream = _create(self.path, opener)
         try:
             self._file = McapFile(
@@ -160,8 +164,9 @@ class LogWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Finish the log if :meth:`finish` was not called, with status ``error`` or ``aborted``."""
-        if self._finished:
+        """Finish the log with status ``error`` or ``aborted``, if it was not finished and has not failed."""
+        if self._finished or self._reported:
+            self._thread.join()
             return
         if error is None:
             self.finish({"status": "error", "reason": "the run ended without a result"})
@@ -175,6 +180,7 @@ class LogWriter:
 
     def _check(self) -> None:
         if self._failure is not None:
+            self._reported = True
             raise self._error(self._failure) from self._failure
         if self._finished:
             raise LogError(self.path, "is finished; nothing can be added")
@@ -197,8 +203,8 @@ class LogWriter:
         try:
             self._write_until_stop()
         except Exception as failure:
-            self._failure = failure
             self._end_after(failure)
+            self._failure = failure
         try:
             self._stream.close()
         except OSError as failure:
@@ -234,11 +240,11 @@ class LogWriter:
         with suppress(Empty):
             return self._queue.get_nowait()
         self._written.set()
-        wait = max(0.0, min(_POLL_S, flush_at - time.monotonic()))
         if self._wait_when_full:  # what is logged outside a turn waits half a flush interval at most
-            self._turn.wait(min(wait, 0.5 * self._flush_s))
+            self._turn.wait(min(_POLL_S, 0.5 * self._flush_s))
             self._turn.clear()
         else:
+            wait = max(0.0, min(_POLL_S, flush_at - time.monotonic()))
             with suppress(Empty):
                 return self._queue.get(timeout=wait) if wait > 0.0 else None
         if not self._finished and not threading.main_thread().is_alive():
@@ -249,11 +255,9 @@ class LogWriter:
         """Flush if it is time to; return when the next flush is due on the monotonic clock [s]."""
         if self._file.unflushed == 0:
             return math.inf
-        now, room = (
-            time.monotonic(),
-            max(1, self._flush_steps - self._turn_steps),
-        )  # steps may wait for a turn
-        if now >= flush_at or self._file.unflushed >= room:
+        now, waiting = time.monotonic(), self._file.unflushed
+        room = max(1, self._flush_steps - self._turn_steps)  # so many may wait for the next turn
+        if waiting >= room or (now >= flush_at and waiting >= self._least):
             self._file.flush(to_disk=self._fsync)
             return math.inf
         return min(flush_at, now + (0.5 if self._wait_when_full else 1.0) * self._flush_s)
