@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from log_files import doctor
+from mcap.reader import make_reader
 from short_runs import short_spec
 
 from tcrctl.cli.app import main
@@ -19,9 +20,12 @@ from tcrctl.log.comparison import Comparison, Difference, quantities
 from tcrctl.log.reader import read_log
 from tcrctl.log.recover import recover
 from tcrctl.log.writer import LogWriter
-from tcrctl.replay.replay import Tolerance, Window, replay
+from tcrctl.replay.figure import WhatIf
+from tcrctl.replay.replay import replay
+from tcrctl.replay.result import Tolerance, Window
 from tcrctl.run import log_geometry, run_experiment
 from tcrctl.run_folder import RESOLVED
+from tcrctl.spec import load_spec
 
 VARIANTS = {
     "full": (),
@@ -33,6 +37,7 @@ VARIANTS = {
     "saturated": ("controller.speed_limit_mm_s=4",),
     "stopped": ("safety.position_error_mm=0.2",),
 }
+REST_SHORT = [f"trajectory.{key}_s=0.5" for key in ("blend_in", "blend_out", "lead_in", "dwell", "settle")]
 
 
 @pytest.fixture(scope="module")
@@ -317,6 +322,36 @@ def test_the_command_prints_one_object_and_exits_0_or_3(logs, capsys):
     assert "different: step 0: wanted.speed[" in printed.out.replace("\n", " ").replace("  ", " ")
     assert "wanted.drive" in printed.out
     assert main(["replay", path, "--from", "5", "--to", "2"]) == 2
+
+
+def test_a_what_if_can_be_drawn(logs, tmp_path, capsys):
+    path, change = str(logs("full")), ["--set", "controller.weights.speed_change=7e3"]
+    picture = tmp_path / "what_if.png"
+    assert main(["replay", path, *change, "--plot", str(picture)]) == 3
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert main(["replay", path, *change, "--plot", str(picture)]) == 2
+    assert main(["replay", path, *change, "--plot", str(tmp_path / "what_if.doc")]) == 2
+    assert ".pdf" in capsys.readouterr().err
+    drawing = WhatIf()
+    replay(path, overrides=change[1:], watch=drawing.add)
+    recorded = [1e3 * step.wanted.speed[2] for step in read_log(path).steps()]
+    above, below = drawing.figure().axes
+    np.testing.assert_array_equal(above.lines[4].get_ydata(), recorded)
+    apart = above.lines[5].get_ydata() - above.lines[4].get_ydata()
+    np.testing.assert_array_equal(below.lines[2].get_ydata(), apart)
+    assert np.abs(apart).max() > 0.0
+
+
+def test_pose_control_at_100_hz_replays_and_takes_less_than_100_kb_per_second(tmp_path):
+    settings = ["controller.period_s=0.01", "trajectory.turns=0.1", "trajectory.ramp_s=0.5", *REST_SHORT]
+    summary = run_experiment(prepare(load_spec("cone_frustum", settings)), out=tmp_path)
+    assert replay(summary.log).status == "identical"
+    with open(summary.log, "rb") as stream:
+        chunks = make_reader(stream).get_summary().chunk_indexes[1:-1]
+    size = sum(chunk.chunk_length + chunk.message_index_length for chunk in chunks)
+    seconds = 1e-9 * (chunks[-1].message_end_time - chunks[0].message_start_time)
+    assert seconds > 1.0
+    assert size / seconds < 100e3
 
 
 def test_other_versions_are_told_before_anything_else(logs, tmp_path, capsys):

@@ -16,7 +16,7 @@ from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from tcrctl.replay.environment import Change
-    from tcrctl.replay.replay import Replay
+    from tcrctl.replay.result import Replay
 
 First = Annotated[
     int | None, typer.Option("--from", metavar="K", min=0, help="First step that is compared; default: 0.")
@@ -32,6 +32,10 @@ Rtol = Annotated[float, typer.Option("--rtol", min=0.0, help="Relative differenc
 Out = Annotated[
     Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write the replayed steps to a new log.")
 ]
+Plot = Annotated[
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Draw recorded and replayed commands; .png, .pdf or .svg."),
+]
 
 
 def replay(
@@ -42,6 +46,7 @@ def replay(
     atol: Atol = 0.0,
     rtol: Rtol = 0.0,
     out: Out = None,
+    plot: Plot = None,
     as_json: AsJson = False,
 ) -> None:
     r"""Feed a log to its own controller, and compare commands, estimates and tensions bit for bit.
@@ -54,13 +59,16 @@ def replay(
     \b
     Examples:
       tcrctl replay logs/20261122-061500Z_letter_t_7f3a/log.mcap
-      tcrctl replay log.mcap --set controller.weights.speed_change=7e3 -o softer.mcap
+      tcrctl replay log.mcap --set controller.weights.speed_change=7e3 --plot softer.png -o softer.mcap
       tcrctl replay log.mcap --from 100 --to 200 --rtol 1e-9 --json
     """
-    from tcrctl.replay.replay import Tolerance, checked_window
+    from tcrctl.replay.figure import WhatIf, check_format, save
     from tcrctl.replay.replay import replay as run_replay
+    from tcrctl.replay.result import Tolerance, checked_window
 
-    window = checked_window(first, last)
+    window, drawing = checked_window(first, last), WhatIf()
+    if plot is not None:
+        check_format(plot)
     with progress_bar("replay") as progress:
         found = run_replay(
             log,
@@ -68,9 +76,12 @@ def replay(
             window=window,
             tolerance=Tolerance(atol, rtol),
             out=out,
+            watch=drawing.add,
             announce=_announce,
             progress=progress,
         )
+    if plot is not None:
+        save(drawing.figure(), plot)
     if as_json:
         print(json.dumps(found.as_json()))
     else:

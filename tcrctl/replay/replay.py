@@ -8,18 +8,18 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from tcrctl.controller.controller import Controller, build_controller
-from tcrctl.errors import InputError, StoppedError
+from tcrctl.errors import StoppedError
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.experiment import Experiment
 from tcrctl.log.checksums import checksums
-from tcrctl.log.comparison import Comparison, Deviation, Difference, quantities
+from tcrctl.log.comparison import Comparison, quantities
 from tcrctl.log.reader import Log, read_log
 from tcrctl.loop import run_loop
 from tcrctl.pacing import Unpaced
@@ -28,6 +28,7 @@ from tcrctl.plant.stroke import within_stroke
 from tcrctl.replay.environment import Change, changes
 from tcrctl.replay.rebuild import Origin, rebuild
 from tcrctl.replay.replayed_log import open_replayed
+from tcrctl.replay.result import ALL_STEPS, EXACT, Replay, Tolerance, Window
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.safety import SafetyLimits
 from tcrctl.signals import StepRecord
@@ -36,6 +37,7 @@ from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
 
 Progress = Callable[[int, int | None], None]
 Announce = Callable[[Sequence[Change]], None]
+Watch = Callable[[StepRecord, StepRecord], None]
 
 #: What a plant of each kind makes of a command, where it depends on nothing but the measurement before.
 LIMITS: Final[Mapping[str, Callable[[Robot, float], Limits]]] = {
@@ -49,91 +51,12 @@ GIVEN: Final = ("k", "measurement.", "truth.", "timing.")
 NO_LIMITS: Final = SafetyLimits(np.inf, np.inf, 2**62)
 
 
-@dataclass(frozen=True, slots=True)
-class Window:
-    """Steps that are compared, both ends included; the replay itself always begins at step 0."""
-
-    first: int = 0
-    last: int | None = None
-
-    def __contains__(self, k: int) -> bool:
-        """Tell whether step ``k`` is compared."""
-        return self.first <= k and (self.last is None or k <= self.last)
-
-
-@dataclass(frozen=True, slots=True)
-class Replay:
-    """What a replay found.
-
-    Attributes:
-        log: The log.
-        status: ``identical``; ``different``; ``incomplete``: no difference, but the log has a gap or no end.
-        reason: What differs or is missing; empty if identical.
-        steps: Steps that were replayed.
-        compared: Steps that were compared with what was recorded.
-        different: Steps of these that differ.
-        whole: Every step that should have been compared was.
-        first_difference: The first number that differs.
-        deviations: Every quantity that differs, in order of appearance.
-        environment: Versions and hardware that differ.
-        not_compared: What could not be compared, and why.
-        duration_s: Time that the replayed steps took when they were recorded [s].
-        seconds: Time that replaying them took [s].
-        out: Log of the replayed steps, if one was asked for.
-    """
-
-    log: Path
-    status: str
-    reason: str
-    steps: int
-    compared: int
-    different: int
-    whole: bool
-    first_difference: Difference | None
-    deviations: tuple[Deviation, ...]
-    environment: tuple[Change, ...]
-    not_compared: tuple[str, ...]
-    duration_s: float
-    seconds: float
-    out: Path | None
-
-    @property
-    def exit_code(self) -> int:
-        """0 if all that the log holds was replayed and is the same, else 3."""
-        return 0 if self.whole and self.first_difference is None else 3
-
-    def as_json(self) -> dict[str, Any]:
-        """The object of ``replay --json``."""
-        return {
-            "status": self.status,
-            "reason": self.reason,
-            "log": str(self.log),
-            "steps": self.steps,
-            "compared": self.compared,
-            "different": self.different,
-            "first_difference": None if self.first_difference is None else self.first_difference.as_json(),
-            "deviations": [deviation.as_json() for deviation in self.deviations],
-            "environment": [
-                {"name": change.name, "recorded": change.recorded, "now": change.now}
-                for change in self.environment
-            ],
-            "not_compared": list(self.not_compared),
-            "duration_s": self.duration_s,
-            "seconds": self.seconds,
-            "out": None if self.out is None else str(self.out),
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class Tolerance:
-    """Differences that count as none: ``atol`` in the unit of each quantity plus ``rtol`` times its value."""
-
-    atol: float = 0.0
-    rtol: float = 0.0
-
-
 def _quiet(done: int, total: int | None) -> None:
     """Show nothing."""
+
+
+def _look_away(recorded: StepRecord, replayed: StepRecord) -> None:
+    """Do nothing."""
 
 
 def _silent(found: Sequence[Change]) -> None:
@@ -144,9 +67,10 @@ def replay(
     path: str | os.PathLike[str],
     *,
     overrides: Sequence[str] = (),
-    window: Window = Window(),
-    tolerance: Tolerance = Tolerance(),
+    window: Window = ALL_STEPS,
+    tolerance: Tolerance = EXACT,
     out: Path | None = None,
+    watch: Watch = _look_away,
     announce: Announce = _silent,
     progress: Progress = _quiet,
 ) -> Replay:
@@ -158,6 +82,7 @@ def replay(
         window: Steps that are compared.
         tolerance: By bytes if left out.
         out: Log to be written with what was replayed.
+        watch: Takes every compared step, as recorded and as replayed.
         announce: Takes what differs from the recording machine, before the first step.
         progress: Takes the number of steps done, and their total if it is known.
 
@@ -169,7 +94,7 @@ def replay(
     environment = changes(log)
     announce(environment)
     origin = rebuild(log, overrides)
-    session = _Session(log, origin, window, tolerance)
+    session = _Session(log, origin, window, tolerance, watch)
     begin = time.perf_counter()
     with ExitStack() as stack:
         writer = None if out is None else stack.enter_context(open_replayed(out, log, origin, session.robot))
@@ -184,8 +109,8 @@ def replay(
 class _Session:
     """One replay in progress."""
 
-    def __init__(self, log: Log, origin: Origin, window: Window, tolerance: Tolerance) -> None:
-        spec = origin.wanted.spec
+    def __init__(self, log: Log, origin: Origin, window: Window, tolerance: Tolerance, watch: Watch) -> None:
+        spec, self._watch = origin.wanted.spec, watch
         self._log, self._origin, self._window = log, origin, window
         self._kind, self._period = spec.plant.kind, float(spec.controller.period_s)
         self.robot = build_robot(origin.wanted.robot)
@@ -226,6 +151,7 @@ class _Session:
             self._done += 1
             if step.k in self._window:
                 self._comparison.add(recorded, replayed)
+                self._watch(recorded, replayed)
                 if record is not None:
                     record(replayed)
             progress(self._done, total)
@@ -319,14 +245,3 @@ def _total(log: Log, window: Window) -> int | None:
     if not written.isdecimal():
         return None
     return int(written) if window.last is None else min(int(written), window.last + 1)
-
-
-def checked_window(first: int | None, last: int | None) -> Window:
-    """Make a window of two step indices as given on the command line.
-
-    Raises:
-        InputError: If it is empty.
-    """
-    if last is not None and last < (first or 0):
-        raise InputError(f"--to {last} is before --from {first or 0}: no step would be compared")
-    return Window(first or 0, last)
