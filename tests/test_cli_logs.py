@@ -19,7 +19,7 @@ from tcrctl.cli.recover import recover
 from tcrctl.errors import InputError, LogError, TcrctlError
 from tcrctl.export import export_csv, export_parquet
 from tcrctl.info import inspect
-from tcrctl.log.columns import COLUMNS
+from tcrctl.log.columns import COLUMNS, meanings
 from tcrctl.log.reader import read_log
 
 N_STEPS = 50
@@ -241,6 +241,18 @@ def test_what_cannot_be_read_exits_2(verb, tmp_path):
         assert (code, out) == (2, "")
         assert str(path) in message
     assert sorted(tmp_path.iterdir()) == [text]
+
+
+def test_every_column_is_listed_with_unit_and_meaning():
+    code, out, _ = tcrctl("export", "--columns")
+    listed = {line.split()[0]: line for line in out.splitlines() if line.strip()}
+    assert code == 0
+    assert set(COLUMNS) <= set(listed)
+    assert "at the end of the horizon (m,) [N]" in " ".join(out.split())
+    said = meanings()
+    assert set(said) == set(COLUMNS)
+    assert said["estimate_tension"] == "Cable tensions of the model (m,) [N]."
+    assert [name for name in COLUMNS if not said[name] and not name.startswith(("k", "t"))] == []
 
 
 def test_export_wants_one_format(log):

@@ -13,6 +13,22 @@ from tcrctl.cli.log_file import LogFile
 from tcrctl.cli.options import AsJson
 
 
+def _print_columns(wanted: bool) -> None:
+    if not wanted:
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from tcrctl.log.columns import COLUMNS, meanings
+
+    table, said = Table("column", "unit", "meaning", box=None), meanings()
+    for name, column in COLUMNS.items():
+        table.add_row(name, column.unit, escape(said.get(name, "")))
+    Console().print(table)
+    raise typer.Exit()
+
+
 def export(
     log: LogFile,
     as_csv: Annotated[bool, typer.Option("--csv", help="One row per step, one column per number.")] = False,
@@ -27,6 +43,10 @@ def export(
     ] = None,
     nodes: Annotated[bool, typer.Option("--nodes", help="CSV, Parquet: also every node and marker.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    columns: Annotated[
+        bool,
+        typer.Option("--columns", help="List all columns and exit.", callback=_print_columns, is_eager=True),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     r"""Write the steps of a log as CSV, npz or Parquet; names end in the SI unit, e.g. estimate_position_x_m.
@@ -36,7 +56,9 @@ def export(
       tcrctl export log.mcap --csv
       tcrctl export log.mcap --npz -o run.npz
       tcrctl export log.mcap --parquet --nodes
+      tcrctl export --columns
     """
+    del columns
     from tcrctl.errors import InputError
     from tcrctl.export import export_csv, export_npz, export_parquet
 
