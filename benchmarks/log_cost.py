@@ -2,9 +2,9 @@
 
     python benchmarks/log_cost.py [--seconds 5]
 
-Steps are those of a 13-module, six-cable robot with full entropy in every digit, each with its state at 20 Hz and with
-the state once a second at 1 kHz, as by default. ``full`` includes the simulated truth, ``rig`` does not; the bytes of
-the viewer topics are the difference to a log without them.
+Steps are those of a 13-module, six-cable robot with full entropy in every digit, each with its state at 20 Hz and
+with the state once a second at 1 kHz, as by default. ``full`` includes the simulated truth, ``rig`` does not; the
+bytes of the viewer topics are the difference to a log without them.
 """
 
 from __future__ import annotations
