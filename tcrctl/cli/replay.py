@@ -66,9 +66,10 @@ def replay(
     from tcrctl.replay.replay import replay as run_replay
     from tcrctl.replay.result import Tolerance, checked_window
 
-    window, drawing = checked_window(first, last), WhatIf()
+    window, drawing = checked_window(first, last), None
     if plot is not None:
         check_format(plot)
+        drawing = WhatIf()
     with progress_bar("replay") as progress:
         found = run_replay(
             log,
@@ -76,11 +77,11 @@ def replay(
             window=window,
             tolerance=Tolerance(atol, rtol),
             out=out,
-            watch=drawing.add,
+            watch=None if drawing is None else drawing.add,
             announce=_announce,
             progress=progress,
         )
-    if plot is not None:
+    if plot is not None and drawing is not None:
         save(drawing.figure(), plot)
     if as_json:
         print(json.dumps(found.as_json()))

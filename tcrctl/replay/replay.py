@@ -47,16 +47,14 @@ LIMITS: Final[Mapping[str, Callable[[Robot, float], Limits]]] = {
 }
 #: Parts of a step that are fed to the replay, or measured with a clock.
 GIVEN: Final = ("k", "measurement.", "truth.", "timing.")
+#: Steps that no log has: the recording itself ends the loop.
+_ENDLESS: Final = 2**40
 #: Stops nothing: a changed controller may fail where the recorded one did not, and the replay shall go on.
 NO_LIMITS: Final = SafetyLimits(np.inf, np.inf, 2**62)
 
 
 def _quiet(done: int, total: int | None) -> None:
     """Show nothing."""
-
-
-def _look_away(recorded: StepRecord, replayed: StepRecord) -> None:
-    """Do nothing."""
 
 
 def _silent(found: Sequence[Change]) -> None:
@@ -70,7 +68,7 @@ def replay(
     window: Window = ALL_STEPS,
     tolerance: Tolerance = EXACT,
     out: Path | None = None,
-    watch: Watch = _look_away,
+    watch: Watch | None = None,
     announce: Announce = _silent,
     progress: Progress = _quiet,
 ) -> Replay:
@@ -109,7 +107,9 @@ def replay(
 class _Session:
     """One replay in progress."""
 
-    def __init__(self, log: Log, origin: Origin, window: Window, tolerance: Tolerance, watch: Watch) -> None:
+    def __init__(
+        self, log: Log, origin: Origin, window: Window, tolerance: Tolerance, watch: Watch | None
+    ) -> None:
         spec, self._watch = origin.wanted.spec, watch
         self._log, self._origin, self._window = log, origin, window
         self._kind, self._period = spec.plant.kind, float(spec.controller.period_s)
@@ -151,7 +151,8 @@ class _Session:
             self._done += 1
             if step.k in self._window:
                 self._comparison.add(recorded, replayed)
-                self._watch(recorded, replayed)
+                if self._watch is not None:
+                    self._watch(recorded, replayed)
                 if record is not None:
                     record(replayed)
             progress(self._done, total)
@@ -166,7 +167,7 @@ class _Session:
                 self._plant,
                 take,
                 period=self._period,
-                duration=2.0**40 * self._period,
+                duration=_ENDLESS * self._period,
                 pace=Unpaced(),
                 limits=experiment.safety if self._origin.wanted is self._origin.recorded else NO_LIMITS,
             )
