@@ -20,12 +20,11 @@ def diff(
     b: Annotated[Path, typer.Argument(metavar="B", help="Log of another run.")],
     as_json: AsJson = False,
 ) -> None:
-    r"""Compare two logs: settings, provenance, and every quantity of every step.
+    """Compare two logs: settings, provenance, and every quantity of every step.
 
-    Exit code 0 if settings and steps are the same, bit for bit, else 3. Run id, machine, versions and durations are
-    shown or left out, and do not count.
+    Exit code 0 if settings and steps are the same, bit for bit, else 3. Run id,
+    machine and versions are shown and do not count; durations are not compared.
 
-    \b
     Examples:
       tcrctl diff before/log.mcap after/log.mcap
       tcrctl diff a.mcap b.mcap --json | jq '.settings[].key'

@@ -49,9 +49,8 @@ def export(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    r"""Write the steps of a log as CSV, npz or Parquet; names end in the SI unit, e.g. estimate_position_x_m.
+    """Write the steps of a log as CSV, npz or Parquet; names end in the SI unit, e.g. estimate_position_x_m.
 
-    \b
     Examples:
       tcrctl export log.mcap --csv
       tcrctl export log.mcap --npz -o run.npz

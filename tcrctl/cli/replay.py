@@ -49,17 +49,21 @@ def replay(
     plot: Plot = None,
     as_json: AsJson = False,
 ) -> None:
-    r"""Feed a log to its own controller, and compare commands, estimates and tensions bit for bit.
+    """Feed a log to its own controller, and compare commands, estimates and tensions bit for bit.
 
-    Robot, estimator and controller are rebuilt from the files attached to the log; measurements, references and
-    applied commands are the recorded ones. --set changes settings of controller, estimator or safety: what would
-    it have done with the same input? The robot does not answer to it; for that, run the experiment again.
-    Exit code 0 if every step is identical, 3 if one is not, or if steps are missing between others.
+    Robot, estimator and controller are rebuilt from the files attached to the
+    log; measurements, references and applied commands are the recorded ones.
 
-    \b
+    With --set, settings of controller, estimator or safety change: what would
+    it have done with the same input? The robot does not answer to it; for
+    that, run the experiment again.
+
+    Exit code 0 if every step is identical, 3 if one is not, or if steps in
+    between are missing.
+
     Examples:
       tcrctl replay logs/20261122-061500Z_letter_t_7f3a/log.mcap
-      tcrctl replay log.mcap --set controller.weights.speed_change=7e3 --plot softer.png -o softer.mcap
+      tcrctl replay log.mcap --set controller.horizon_s=1.0 --plot longer.png
       tcrctl replay log.mcap --from 100 --to 200 --rtol 1e-9 --json
     """
     from tcrctl.replay.figure import WhatIf, check_format, save
