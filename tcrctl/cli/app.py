@@ -16,6 +16,7 @@ from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
+from tcrctl.cli.plot import plot
 from tcrctl.cli.recover import recover
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
@@ -33,6 +34,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "info": info,
     "recover": recover,
     "export": export,
+    "plot": plot,
 }
 
 
