@@ -215,7 +215,7 @@ def test_saturated_inputs_are_crossed_and_near_limits_drawn(pose):
         assert_allclose(t, history.t[where])
         assert_allclose(speed, 1e3 * history.speed[where, c])
     assert 0 < history.saturated.sum() < history.saturated.size
-    level = [line.get_ydata()[0] for line in figure.axes[0].lines if line.get_xdata() == [0, 1]]
+    level = [line.get_ydata()[0] for line in figure.axes[0].lines if list(line.get_xdata()) == [0, 1]]
     assert level == [-6.0, 6.0]
 
 

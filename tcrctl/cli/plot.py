@@ -45,11 +45,10 @@ def plot(
     end: End = None,
     as_json: AsJson = False,
 ) -> None:
-    r"""Draw figures of a run; several logs are overlaid. Files that exist are replaced.
+    """Draw figures of a run; several logs are overlaid. Files that exist are replaced.
 
     Figures: overview, path, position, orientation, normal, error, drives, speeds, tensions, timing.
 
-    \b
     Examples:
       tcrctl plot logs/*_letter_t_*/log.mcap
       tcrctl plot log.mcap --figure path --figure error --format pdf --out figures
