@@ -18,6 +18,7 @@ from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.plot import plot
 from tcrctl.cli.recover import recover
+from tcrctl.cli.report import report
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
@@ -35,6 +36,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "recover": recover,
     "export": export,
     "plot": plot,
+    "report": report,
 }
 
 
