@@ -11,6 +11,9 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
+
+import numpy as np
 
 from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedError, TcrctlError
 from tcrctl.experiment import Experiment, Notify, Parts, build_parts, build_plant, silent
@@ -21,11 +24,16 @@ from tcrctl.loop import run_loop
 from tcrctl.metrics import Metrics
 from tcrctl.pacing import Pace, RealTime, Unpaced
 from tcrctl.provenance import attachments, resolved_text, start_metadata
-from tcrctl.robot.model import FIXED, ring_rows
+from tcrctl.robot.model import FIXED, RIGID_BARS, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.run_folder import LOG, RESOLVED, SPEC, SUMMARY, RunFolder, check_writable, make_run_folder
 from tcrctl.signals import StepRecord
 from tcrctl.summary import Summary, Verdict, judge
+from tcrctl.trajectory.trajectory import Trajectory
+
+#: Points of the drawn path of the reference: as far apart in time as this [s], but no more than these.
+PATH_SPACING_S: Final = 0.1
+MOST_PATH_POINTS: Final = 1000
 
 Progress = Callable[[int, int], None]
 
@@ -88,7 +96,7 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool) -> L
             folder.path / LOG,
             attachments=attachments(loaded, spec),
             start=start_metadata(folder.run_id, loaded, spec, realtime=realtime),
-            geometry=log_geometry(experiment.robot),
+            geometry=log_geometry(experiment.robot, experiment.trajectory),
             epoch_ns=time.time_ns(),
             period_s=experiment.period,
             flush_s=spec.log.flush_s,
@@ -101,13 +109,22 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool) -> L
         raise
 
 
-def log_geometry(robot: Robot) -> LogGeometry:
-    """Return the names and the topology that the log needs to draw a robot."""
+def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeometry:
+    """Return the names and the topology that the log needs to draw a robot, and the path of its end."""
     model, routes = robot.model, []
     for c, name in enumerate(robot.cable_names):
         holes = slice(model.first_hole[c], model.first_hole[c + 1])
         routes.append(CableRoute(name, model.hole_nodes[holes], model.hole_weights[holes]))
-    return LogGeometry(robot.n_modules, tuple(routes), tuple(ring_rows(robot.n_modules)), robot.tip // FIXED)
+    duration = 0.0 if trajectory is None else trajectory.duration
+    points = np.linspace(0.0, duration, min(MOST_PATH_POINTS, 2 + int(duration / PATH_SPACING_S)))
+    return LogGeometry(
+        robot.n_modules,
+        tuple(routes),
+        tuple(ring_rows(robot.n_modules)),
+        robot.tip // FIXED,
+        springs=model.bar_nodes[RIGID_BARS * robot.n_modules :],
+        reference_path=np.zeros((0, 3)) if trajectory is None else trajectory.position(points),
+    )
 
 
 def _recorded_run(

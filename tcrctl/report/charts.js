@@ -65,7 +65,7 @@ class Chart {
     this.x = (t) => LEFT + ((t - span.from) / (span.to - span.from)) * (width - LEFT - RIGHT);
     this.y = (v) => height - BOTTOM - ((v - low) / (high - low)) * (height - TOP - BOTTOM);
     this.width = width; this.height = height;
-    this.digits = Math.min(6, Math.max(0, 2 - Math.floor(Math.log10(high - low))));
+    this.digits = Math.min(4, Math.max(0, 4 - Math.floor(Math.log10(high - low))));
     this.drawGrid(c, low, high);
     c.save(); c.beginPath(); c.rect(LEFT, TOP - 2, width - LEFT - RIGHT, height - TOP - BOTTOM + 4); c.clip();
     this.drawLimits(c);
