@@ -19,6 +19,7 @@ from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedErr
 from tcrctl.experiment import Experiment, Notify, Parts, build_parts, build_plant, silent
 from tcrctl.interruption import Interruption
 from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.mcap_file import Tap
 from tcrctl.log.writer import LogWriter
 from tcrctl.loop import run_loop
 from tcrctl.metrics import Metrics
@@ -49,6 +50,7 @@ def run_experiment(
     realtime: bool = False,
     notify: Notify = silent,
     progress: Progress = _no_progress,
+    tap: Tap | None = None,
 ) -> Summary:
     """Run an experiment and record it.
 
@@ -60,6 +62,7 @@ def run_experiment(
         realtime: Pace a simulated plant by the clock.
         notify: Takes messages for the user.
         progress: Takes the number of steps done and their total, after every step.
+        tap: Takes every message of the log, in the log's thread; see :class:`tcrctl.view.live.LiveView`.
 
     Returns:
         The result; also of a run that was stopped by a limit, a signal or a device.
@@ -74,7 +77,7 @@ def run_experiment(
         try:
             parts = build_parts(experiment, plant, state)
             folder = make_run_folder(out, experiment.spec.name)
-            log = _open_log(experiment, folder, realtime=realtime)
+            log = _open_log(experiment, folder, realtime=realtime, tap=tap)
         except BaseException:
             plant.close()
             raise
@@ -86,7 +89,7 @@ def run_experiment(
     return summary
 
 
-def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool) -> LogWriter:
+def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap: Tap | None) -> LogWriter:
     """Write what is known before the first step; on failure the folder is as if it had never been."""
     spec, loaded = experiment.spec, experiment.loaded
     try:
@@ -103,6 +106,7 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool) -> L
             flush_steps=spec.log.flush_steps,
             fsync=spec.log.fsync,
             wait_when_full=not realtime,
+            tap=tap,
         )
     except BaseException:
         folder.discard()

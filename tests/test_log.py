@@ -18,8 +18,8 @@ from tcrctl.errors import InputError, LogError, UnknownNameError
 from tcrctl.log.codec import decode_step, encode
 from tcrctl.log.columns import COLUMNS
 from tcrctl.log.reader import read_log
-from tcrctl.log.viewer_topics import TOPICS
 from tcrctl.log.schema import descriptor_set, public_descriptor
+from tcrctl.log.viewer_topics import TOPICS
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import IO, Any, Final
 
 from foxglove_schemas_protobuf.Log_pb2 import Log as FoxgloveLog
@@ -26,6 +26,8 @@ LOG_TOPIC: Final = "/log"
 LIBRARY: Final = f"tcrctl/{__version__} {LIBRARY_IDENTIFIER}"
 
 Attachments = Mapping[str, tuple[str, bytes]]
+Tap = Callable[[str, int, bytes], None]
+"""Takes topic, log time [Unix ns] and content of every message that is written; must neither wait nor raise."""
 
 
 def new_mcap(stream: IO[bytes]) -> Writer:
@@ -60,6 +62,7 @@ class McapFile:
         self._schemas: dict[str, int] = {}
         self._channels = self._register(geometry)
         self._events = 0
+        self.tap: Tap | None = None
         self.steps = 0
         self.unflushed = 0
         # Schemas and channels live in the first chunk, and a chunk needs a message: now all of it is on file.
@@ -126,6 +129,8 @@ class McapFile:
 
     def _add(self, topic: str, log_time: int, data: bytes, sequence: int, publish_time: int) -> None:
         self._writer.add_message(self._channels[topic], log_time, data, publish_time, sequence % 2**32)
+        if self.tap is not None:
+            self.tap(topic, log_time, data)
 
     def flush(self, *, to_disk: bool = False) -> None:
         """End the chunk and hand it to the operating system, and to the disk if ``to_disk``."""
