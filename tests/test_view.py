@@ -254,7 +254,7 @@ def test_a_live_view_shows_what_the_log_holds(short, tmp_path):
 
 
 def test_the_command_shows_a_run_while_it_runs(tmp_path, capsys):
-    assert main(["run", "letter_t", *arguments(), "--view", "--port", "0", "--out", str(tmp_path)]) == 0
+    assert main(["run", "letter_t", *arguments(), "--view", "--view-port", "0", "--out", str(tmp_path)]) == 0
     assert "live view at ws://127.0.0.1:" in capsys.readouterr().err
 
 

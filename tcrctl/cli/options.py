@@ -17,10 +17,3 @@ Overrides: TypeAlias = Annotated[
 ]
 AsJson: TypeAlias = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 IsRobot: TypeAlias = Annotated[bool, typer.Option("--robot", help="Robot files instead of experiments.")]
-ViewHost: TypeAlias = Annotated[
-    str,
-    typer.Option("--host", metavar="ADDRESS", help="Address to serve the view at; 0.0.0.0 for everybody."),
-]
-ViewPort: TypeAlias = Annotated[
-    int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port of the view; 0 takes a free one.")
-]

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcrctl.cli.log_file import LogFile
-from tcrctl.cli.options import ViewHost, ViewPort
 
 if TYPE_CHECKING:
     from tcrctl.view.server import ViewServer
@@ -30,10 +29,14 @@ def play(
         list[str] | None,
         typer.Option("--topic", metavar="NAME", help="Which topics; repeatable. Default: all."),
     ] = None,
-    host: ViewHost = "127.0.0.1",
-    port: ViewPort = 8765,
+    host: Annotated[
+        str, typer.Option("--host", metavar="ADDRESS", help="Where to serve; 0.0.0.0 for everybody.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port; 0 takes a free one.")
+    ] = 8765,
 ) -> None:
-    """Play a log to the Foxglove app; nothing but pictures moves. Needs pip install 'tcrctl[view]'.
+    """Play a log to the Foxglove app; nothing but pictures moves. Needs the package's extra 'view'.
 
     Playing begins when the app has connected. The app's time bar seeks, pauses and sets the speed, also after the
     end; Ctrl-C ends the program. The address is printed on stdout.

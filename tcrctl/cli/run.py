@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson, Overrides, Spec, ViewHost, ViewPort
+from tcrctl.cli.options import AsJson, Overrides, Spec
 
 if TYPE_CHECKING:
     from tcrctl.experiment import Experiment, Notify
@@ -30,6 +30,12 @@ Seed = Annotated[
 ]
 Force = Annotated[bool, typer.Option("--force", help="Run even if the trajectory seems infeasible.")]
 View = Annotated[bool, typer.Option("--view", help="Show the run in the Foxglove app while it runs.")]
+ViewHost = Annotated[
+    str, typer.Option("--view-host", metavar="ADDRESS", help="Where to serve it; 0.0.0.0 for everybody.")
+]
+ViewPort = Annotated[
+    int, typer.Option("--view-port", metavar="N", min=0, max=65535, help="Port of it; 0 takes a free one.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
@@ -42,8 +48,8 @@ def run(
     seed: Seed = None,
     force: Force = False,
     view: View = False,
-    host: ViewHost = "127.0.0.1",
-    port: ViewPort = 8765,
+    view_host: ViewHost = "127.0.0.1",
+    view_port: ViewPort = 8765,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
@@ -69,7 +75,8 @@ def run(
             say(_headline(loaded))
             if not dry_run:
                 _get_ready(out)
-            tap = viewing.enter_context(_live_view(loaded, host, port)) if view and not dry_run else None
+            served = _live_view(loaded, view_host, view_port, say) if view and not dry_run else nullcontext()
+            tap = viewing.enter_context(served)
             from tcrctl.experiment import prepare
 
             experiment = prepare(loaded, seed=seed, notify=say)
@@ -97,15 +104,15 @@ def _get_ready(out: Path) -> None:
 
 
 @contextmanager
-def _live_view(loaded: LoadedSpec, host: str, port: int) -> Iterator[Tap]:
+def _live_view(loaded: LoadedSpec, host: str, port: int, say: Notify) -> Iterator[Tap]:
     """Serve the run to the Foxglove app while it is prepared and while it runs."""
     from tcrctl.view.live import LiveView
 
     with LiveView(loaded.spec.name, host=host, port=port) as live:
-        _say(f"live view at {live.url}; open {live.app_url}")
+        say(f"live view at {live.url}; open {live.app_url}")
         yield live.tap
         if live.failure is not None:
-            _say(f"warning: the live view ended before the run: {live.failure}")
+            say(f"warning: the live view ended before the run: {live.failure}")
 
 
 def _run(

@@ -131,7 +131,7 @@ class ViewServer:
                 message_backlog_size=_BACKLOG,
             )
         except Exception as error:
-            hint = "Is another viewer server running? Choose another port with --port."
+            hint = "Is another view being served? Choose another port; 0 takes a free one."
             raise DeviceError(f"cannot serve at {host}:{port}: {error}", hint=hint) from error
         self._channels = {channel.topic: _channel(sdk, self._context, channel) for channel in channels}
         self._latest: dict[str, tuple[int, bytes]] = {}
