@@ -152,7 +152,7 @@ def limit(panel: Axes, values: Array, bounds: Sequence[float | None], name: str,
         name: What it is called.
         unit: Its unit.
     """
-    known = [bound for bound in bounds if bound is not None]
+    known = [bound for bound in bounds if bound is not None] if np.isfinite(values).any() else []
     near = [bound for bound in known if _is_near(bound, values)]
     for bound in near:
         _draw_limit(panel, bound, f"{name} {bound:g} {unit}")

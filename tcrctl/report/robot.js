@@ -48,7 +48,7 @@ class RobotView {
       const a = this.path.actual, low = [0, 1, 2].map((k) => Infinity), high = [0, 1, 2].map((k) => -Infinity);
       for (let i = 0; i < a.length; i++) { low[i % 3] = Math.min(low[i % 3], a[i]); high[i % 3] = Math.max(high[i % 3], a[i]); }
       this.target = low.map((v, k) => (v + high[k]) / 2);
-      this.zoom = Math.min(20, this.box.size / Math.max(0.03, 1.5 * Math.max(...high.map((v, k) => v - low[k]))));
+      this.zoom = Math.min(20, this.box.size / Math.max(0.05, 2.6 * Math.max(...high.map((v, k) => v - low[k]))));
     }
     this.draw();
   }
