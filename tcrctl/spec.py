@@ -17,14 +17,15 @@ from tcrctl.controller.settings import ControllerSettings, IocSettings
 from tcrctl.criterion import CriterionText
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
-from tcrctl.plant.settings import PlantSettings
+from tcrctl.plant.settings import PlantSettings, rings_named
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
 from tcrctl.settings import Path as Keys
 from tcrctl.settings import Settings, quantity, refuse
 from tcrctl.summary import TASK, UNITS
+from tcrctl.task.settings import TaskSettings
 from tcrctl.trajectory.drive_settings import DrivesSettings
-from tcrctl.trajectory.settings import TrajectorySettings
+from tcrctl.trajectory.settings import TrajectorySettings, named_targets
 
 
 class LogSettings(Settings):
@@ -63,6 +64,7 @@ class ExperimentSpec(Settings):
     controller: ControllerSettings
     estimator: EstimatorSettings = PassiveObserverSettings(kind="passive_observer")
     plant: PlantSettings
+    task: TaskSettings | None = Field(default=None, description="what the run is for, if it has a task")
     criteria: tuple[CriterionText, ...] = Field(
         default=(), description="what the run must achieve, else exit code 3"
     )
@@ -77,10 +79,12 @@ class ExperimentSpec(Settings):
 
 
 def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+    results = [*UNITS, *(TASK + name for name in (spec.task.result_names if spec.task else ()))]
     for i, criterion in enumerate(spec.criteria):
-        if criterion.name not in UNITS and not criterion.name.startswith(TASK):
-            known = ", ".join(difflib.get_close_matches(criterion.name, UNITS, n=3, cutoff=0.3) or UNITS)
-            yield ("criteria", i), f"a run has no result {criterion.name}; known: {known}, {TASK}..."
+        if criterion.name not in results:
+            known = ", ".join(difflib.get_close_matches(criterion.name, results, n=3, cutoff=0.3) or results)
+            yield ("criteria", i), f"a run has no result {criterion.name}; known: {known}"
+    yield from _target_disagreements(spec)
     if spec.controller.kind == "open_loop" and spec.trajectory.kind != "drives":
         yield (
             ("trajectory", "kind"),
@@ -93,6 +97,15 @@ def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
         yield ("plant", "step_ms"), f"a control period of {what}"
 
 
+def _target_disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+    targets = spec.task.target_names if spec.task else ()
+    for keys, name in named_targets(spec.trajectory):
+        if spec.task is None:
+            yield ("trajectory", *keys), f"there is no task with a target {name}; the experiment has none"
+        elif name not in targets:
+            yield ("trajectory", *keys), f"the task has no target {name}; it has {', '.join(targets)}"
+
+
 def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
     """Yield path and message of what the experiment asks and the robot does not have.
 
@@ -100,27 +113,36 @@ def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Key
         spec: The experiment.
         robot: Its robot.
     """
-    count, rings = robot.modules.count, spec.plant.measured_rings
-    for i, ring in enumerate(() if rings == "all" else rings):
+    count = robot.modules.count
+    for keys, ring in rings_named(spec.plant):
         if ring > count:
-            yield (
-                ("plant", "measured_rings", i),
-                f"there is no ring {ring}; {robot.name} has rings 1 to {count}",
-            )
-    yield from _drive_misfits(spec.trajectory, robot)
+            yield ("plant", *keys), f"there is no ring {ring}; {robot.name} has rings 1 to {count}"
+    yield from _drive_misfits(spec, robot)
     tension = spec.controller.tension if isinstance(spec.controller, IocSettings) else None
     if tension is not None and tension.ceiling_n > robot.tension_limit_n:
         limit = f"tension_limit_n of {robot.name}, {robot.tension_limit_n:g}"
         yield ("controller", "tension", "ceiling_n"), f"must be at most {limit}, not {tension.ceiling_n:g}"
 
 
-def _drive_misfits(trajectory: TrajectorySettings, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
-    legs = trajectory.legs if isinstance(trajectory, DrivesSettings) else ()
+def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+    legs = spec.trajectory.legs if isinstance(spec.trajectory, DrivesSettings) else ()
+    given: list[tuple[Keys, tuple[float, ...]]] = [
+        (("trajectory", "legs", i, "drives_mm"), leg.drives_mm) for i, leg in enumerate(legs)
+    ]
+    if spec.plant.start_drives_mm is not None:
+        given.append((("plant", "start_drives_mm"), spec.plant.start_drives_mm))
     names = [route.name for route in cable_routes(robot)]
-    for i, leg in enumerate(legs):
-        if len(leg.drives_mm) != len(names):
+    for keys, lengths in given:
+        if len(lengths) != len(names):
             has = f"{robot.name} has {len(names)} cables, {', '.join(names)}"
-            yield ("trajectory", "legs", i, "drives_mm"), f"{has}; there are {len(leg.drives_mm)} lengths"
+            yield keys, f"{has}; there are {len(lengths)} lengths"
+    low, high = robot.stroke_mm
+    for c, length in enumerate(spec.plant.start_drives_mm or ()):
+        if not low <= length <= high:
+            yield (
+                ("plant", "start_drives_mm", c),
+                f"must be within stroke_mm, {low:g} to {high:g}, not {length:g}",
+            )
 
 
 @dataclass(frozen=True, slots=True)

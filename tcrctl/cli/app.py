@@ -16,6 +16,7 @@ from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
+from tcrctl.cli.paper import paper
 from tcrctl.cli.play import play
 from tcrctl.cli.plot import plot
 from tcrctl.cli.recover import recover
@@ -23,6 +24,7 @@ from tcrctl.cli.report import report
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
+from tcrctl.cli.stability import stability
 from tcrctl.cli.validate import validate
 from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
@@ -33,9 +35,11 @@ VERBS: dict[str, Callable[..., None]] = {
     "validate": validate,
     "new": new,
     "schema": schema,
+    "stability": stability,
     "info": info,
     "recover": recover,
     "export": export,
+    "paper": paper,
     "play": play,
     "plot": plot,
     "report": report,

@@ -5,24 +5,36 @@ from __future__ import annotations
 import numpy as np
 
 from tcrctl.controller.ioc import Weights
-from tcrctl.controller.settings import IocSettings
+from tcrctl.controller.settings import IocSettings, KinematicSettings
 from tcrctl.robot import pose
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Estimate, Reference
 
 
-def make_weights(settings: IocSettings, m: int) -> Weights:
-    """Weights of (30) for ``m`` cables; position-only tracking has no weight on normal and twist."""
+def make_weights(settings: IocSettings, m: int, instants: int) -> Weights:
+    """Weights of (30) for ``m`` cables; position-only tracking has no weight on normal and twist.
+
+    The output weights are shared out over the prediction ``instants``, so that the cost is their mean and R and W
+    mean the same whatever their number. W is what keeps the loop stable when the plant's slow modes are faster
+    or slower than the model's; a sum over the instants would weaken it as many times.
+    """
     w, tension = settings.weights, settings.tension
     output = np.zeros(POSE_ROWS + m)
     output[:3] = w.position
     if settings.output == "pose":
         output[3:6], output[6] = w.normal, w.twist
     if tension is None:
-        return Weights(output, w.speed, w.speed_change, -np.inf, np.inf, 1.0)
+        return Weights(output / instants, w.speed, w.speed_change, -np.inf, np.inf, 1.0)
     output[POSE_ROWS:] = tension.weight
-    return Weights(output, w.speed, w.speed_change, tension.floor_n, tension.ceiling_n, tension.softness)
+    return Weights(
+        output / instants,
+        w.speed,
+        w.speed_change,
+        tension.floor_n,
+        tension.ceiling_n,
+        instants * tension.softness,
+    )
 
 
 def make_target(settings: IocSettings, reference: Reference, shift: Array, m: int) -> Array:
@@ -37,7 +49,9 @@ def make_target(settings: IocSettings, reference: Reference, shift: Array, m: in
     return target
 
 
-def input_limits(settings: IocSettings, robot: Robot, drive: Array, blocks: int) -> tuple[Array, Array]:
+def input_limits(
+    settings: IocSettings | KinematicSettings, robot: Robot, drive: Array, blocks: int
+) -> tuple[Array, Array]:
     """Hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
     limit = settings.speed_limit_mm_s / 1000.0
     low, high = np.full(blocks * drive.shape[0], -limit), np.full(blocks * drive.shape[0], limit)
