@@ -94,7 +94,7 @@ class LogWriter:
         self._least, self._turn_steps = 1, 0
         if wait_when_full:  # on a slow machine too a chunk shall be worth compressing
             self._least = max(1, math.ceil(flush_s / period_s - 1e-9))
-            self._turn_steps = max(1, min(_TURN_STEPS, flush_steps // 2, self._least // 2))
+            self._turn_steps = max(1, min(_TURN_STEPS, flush_steps // 2))
         self._limit = max(_QUEUE_MIN_STEPS, math.ceil(_QUEUE_S / period_s))
         self._queue: SimpleQueue[StepRecord | Event | dict[str, str]] = SimpleQueue()
         self._turn, self._written = threading.Event(), threading.Event()
