@@ -24,12 +24,18 @@ from tcrctl.robot.equations import make_workspace
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.signals import Command, Estimate, Reference
 
-PREDICTIONS = ["multi_step", "one_step", "literal"]
+#: Keys of ``controller:`` for every way to predict.
+PREDICTIONS = {
+    "multi_step": {"prediction": "multi_step", "horizon_s": 0.8},
+    "one_step": {"prediction": "one_step", "horizon_s": 0.4},
+    "literal": {"prediction": "literal", "horizon_s": 0.05},
+    "static": {"prediction": "multi_step", "horizon_s": 0.8, "model": "static"},
+    "static literal": {"prediction": "literal", "horizon_s": 0.05, "model": "static"},
+}
 
 
 def ioc(prediction="multi_step", **changes) -> IocSettings:
-    horizon = {"multi_step": 0.8, "one_step": 0.4, "literal": 0.05}[prediction]
-    return IocSettings(kind="ioc", prediction=prediction, **{"horizon_s": horizon, **changes})
+    return IocSettings(kind="ioc", **{**PREDICTIONS[prediction], **changes})
 
 
 def pose_settings(**changes) -> IocSettings:

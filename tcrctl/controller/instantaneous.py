@@ -17,14 +17,16 @@ from tcrctl.controller.multi_step import MultiStep
 from tcrctl.controller.one_step import OneStep
 from tcrctl.controller.predictor import Forecast, Predictor
 from tcrctl.controller.settings import IocSettings
+from tcrctl.controller.static import Static
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
-#: Choice of prediction by name.
-PREDICTORS: Mapping[str, Callable[[IocSettings, Robot], Predictor]] = {
-    "multi_step": MultiStep,
-    "one_step": OneStep,
+#: Choice of prediction by the names of model and prediction.
+PREDICTORS: Mapping[tuple[str, str], Callable[[IocSettings, Robot], Predictor]] = {
+    ("dynamic", "multi_step"): MultiStep,
+    ("dynamic", "one_step"): OneStep,
+    ("static", "multi_step"): Static,
 }
 
 #: Largest violation of the LCP conditions accepted; their rows are speeds [m/s] and tensions [N].
@@ -43,7 +45,7 @@ class InstantaneousOptimalControl:
 
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
         self._settings, self._robot = settings, robot
-        self._predictor = PREDICTORS[settings.prediction](settings, robot)
+        self._predictor = PREDICTORS[settings.model, settings.prediction](settings, robot)
         self._weights = make_weights(settings, robot.n_cables, self._predictor.ahead.size)
         self._integral = IntegralAction(settings.integral, settings.period_s)
         self._speed = np.zeros(robot.n_cables)
@@ -90,6 +92,8 @@ def _doubt(estimate: Estimate, forecast: Forecast) -> str:
     """Empty, or why no command can be built on this step."""
     if not estimate.converged:
         return "the estimator's step did not converge"
+    if not np.isfinite(estimate.q).all():
+        return "the estimate is not finite"
     if not forecast.converged:
         return forecast.reason
     if not (np.isfinite(forecast.prediction.free).all() and np.isfinite(forecast.prediction.gain).all()):

@@ -1,5 +1,8 @@
 """Algorithm 1 as printed (with the corrections of REFERENCES.md): one generalized-alpha step of one period.
 
+With ``model: static`` the first equation of (9) is degraded to its static form, as in Sec. V.E: the same iteration
+then finds an equilibrium, and nothing but the drives and the last input is left of the state.
+
 Positions and inputs are iterated together, (28): linearise the step at z^(j), solve the LCP for u, take the
 full Newton step. It is kept to show what the multi-step controller is for: in one period the soft modes do not
 answer, so the algorithm misjudges its authority.
@@ -16,6 +19,7 @@ from tcrctl.controller.settings import IocSettings
 from tcrctl.numerics.generalized_alpha import coefficients
 from tcrctl.robot import dynamics, linear, pose
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, assemble, make_workspace
+from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.model import FIXED
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
@@ -44,8 +48,10 @@ class LiteralIoc:
         self.ahead = np.array([settings.period_s])
 
     def _load(self, estimate: Estimate, v: Array) -> tuple[Array, Load]:
-        """Predictor positions and load of the step (12)-(14) with zero acceleration at its start."""
+        """Predictor positions and load of the step (12)-(14) with zero acceleration at its start; or of statics."""
         h, s, robot = self._settings.period_s, self._scratch, self._robot
+        if self._settings.model == "static":
+            return estimate.q.copy(), static_load(robot.model, robot.weight)
         c = coefficients(RHO, h)
         inertia = c.acceleration + robot.model.damping * c.velocity
         q0 = estimate.q + h * v

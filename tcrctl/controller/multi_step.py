@@ -92,17 +92,29 @@ class Memory(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _follow(model: Model, load: Load, ws: Workspace, memory: Memory, drive: Array) -> Outcome:
-    """Move the model's equilibrium to ``drive``, starting where its static gain points to."""
-    q = memory.equilibrium.copy()
-    for k in range(memory.gain.shape[0]):
+def follow(
+    model: Model, load: Load, ws: Workspace, equilibrium: Array, drive: Array, gain: Array, wanted: Array
+) -> Outcome:
+    """Move the model's equilibrium to other drives, starting where its static gain points to.
+
+    Args:
+        model: Robot arrays.
+        load: Static load.
+        ws: Workspace; afterwards it belongs to the new equilibrium.
+        equilibrium: q_eq (3 n_nodes,) [m], moved.
+        drive: Drives it belongs to (m,) [m], moved.
+        gain: ∂q_eq/∂d (12 n_modules, m) with the taut cables, moved.
+        wanted: The new drives (m,) [m].
+    """
+    q = equilibrium.copy()
+    for k in range(gain.shape[0]):
         for c in range(drive.shape[0]):
-            q[3 * FIXED + k] += memory.gain[k, c] * (drive[c] - memory.drive[c])
-    outcome = minimise(model, q, drive, load, ws, TOLERANCE, int(MAX_ITERATIONS), bool(1))
+            q[3 * FIXED + k] += gain[k, c] * (wanted[c] - drive[c])
+    outcome = minimise(model, q, wanted, load, ws, TOLERANCE, int(MAX_ITERATIONS), bool(1))
     if outcome.converged:
-        memory.equilibrium[:], memory.drive[:] = q, drive
+        equilibrium[:], drive[:] = q, wanted
         linear.couple(ws, ws.r)
-        linear.drive_gain(ws, memory.gain)
+        linear.drive_gain(ws, gain)
     return outcome
 
 
@@ -159,7 +171,7 @@ def forecast(
     Returns:
         Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m).
     """  # fmt: skip
-    outcome = _follow(model, load, ws, memory, drive)
+    outcome = follow(model, load, ws, memory.equilibrium, memory.drive, memory.gain, drive)
     deviation, away, finite = np.empty(q.shape[0]), np.empty(q.shape[0]), True
     for k in range(q.shape[0]):
         deviation[k] = q[k] - memory.equilibrium[k]

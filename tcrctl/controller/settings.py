@@ -66,6 +66,11 @@ class IocSettings(Settings):
     output: Literal["position", "pose"] = Field(default="position", description="what is tracked")
     period_s: float = quantity("s", "control period", 0.05, gt=0, le=10)
     horizon_s: float = quantity("s", "prediction horizon, at least one period", 0.8, gt=0, le=60)
+    model: Literal["dynamic", "static"] = Field(
+        default="dynamic",
+        description="dynamic: the equations of motion; static: their static form, the end follows the drives "
+        "at once",
+    )
     prediction: Literal["multi_step", "one_step", "literal"] = Field(
         default="multi_step",
         description="multi_step: linear response over the horizon; one_step: one backward-Euler step as long "
@@ -106,6 +111,9 @@ class IocSettings(Settings):
     def _disagreements(self) -> Iterator[tuple[Path, str]]:
         if self.horizon_s < self.period_s:
             yield ("horizon_s",), f"must be at least period_s, {self.period_s:g}, not {self.horizon_s:g}"
+        if self.model == "static" and self.prediction == "one_step":
+            what = "one_step is a time step of the equations of motion; statics go with multi_step or literal"
+            yield ("prediction",), what
         if self.prediction == "multi_step" and self.horizon_s / self.instants > 0.25:
             yield ("instants",), "must be so many that instants lie at most 0.25 s apart"
         if self.prediction == "multi_step" and self.blocks > self.instants:
