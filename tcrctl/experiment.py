@@ -123,8 +123,8 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
     with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
         robot = build_robot(loaded.robot)
         trajectory = build_trajectory(spec.trajectory, robot)
-        wants_pose = isinstance(spec.controller, IocSettings) and spec.controller.output == "pose"
-        if wants_pose and trajectory.normal(np.zeros(1)) is None:
+        tracks = None if isinstance(spec.controller, OpenLoopSettings) else spec.controller.output
+        if tracks == "pose" and trajectory.normal(np.zeros(1)) is None:
             raise InputError(
                 f"{loaded.path}: controller.output: pose needs a trajectory with an orientation; "
                 f"trajectory.kind: {spec.trajectory.kind} leaves it free"

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Protocol
 
 from tcrctl.controller.instantaneous import InstantaneousOptimalControl
+from tcrctl.controller.kinematic import Kinematic
 from tcrctl.controller.literal import LiteralIoc
 from tcrctl.controller.open_loop import OpenLoop
-from tcrctl.controller.settings import ControllerSettings, OpenLoopSettings
+from tcrctl.controller.settings import ControllerSettings, KinematicSettings, OpenLoopSettings
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
@@ -30,6 +31,8 @@ def build_controller(settings: ControllerSettings, robot: Robot) -> Controller:
     """Build the controller of a ``controller:`` section."""
     if isinstance(settings, OpenLoopSettings):
         return OpenLoop(settings, robot)
+    if isinstance(settings, KinematicSettings):
+        return Kinematic(settings, robot)
     if settings.prediction == "literal":
         return LiteralIoc(settings, robot)
     return InstantaneousOptimalControl(settings, robot)

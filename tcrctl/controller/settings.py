@@ -126,6 +126,31 @@ class IocSettings(Settings):
             yield ("weights", "normal"), "must be > 0 with output: pose, or the normal is not tracked"
 
 
+class SlackGuard(Settings):
+    """Moves that leave the end where it is, by the model, bring the tensions towards a reference."""
+
+    reference_n: float = quantity("N", "tension that every cable is drawn to", 5.0, gt=0)
+    gain_1_s: float = quantity("1/s", "part of the difference that is removed per second", 0.5, gt=0)
+
+
+class KinematicSettings(Settings):
+    """Baseline for comparisons: resolved rates with the damped pseudo-inverse of the static map."""
+
+    kind: Literal["kinematic"]
+    output: Literal["position", "pose"] = Field(default="position", description="what is tracked")
+    period_s: float = quantity("s", "control period", 0.05, gt=0, le=10)
+    gain_1_s: float = quantity("1/s", "part of the measured error that is removed per second", 0.3, ge=0)
+    integral: OrOff[IntegralSettings] = Field(default=None, description="integral action, or off")
+    damping: float = quantity("m/m", "damping of the pseudo-inverse", 0.05, ge=0)
+    lever_mm: float = quantity(
+        "mm", "length that makes a change of the normal comparable with one of the position", 100.0, gt=0
+    )
+    tension: OrOff[SlackGuard] = Field(
+        default=SlackGuard(), description="keeps cables taut where the pose leaves a choice, or off"
+    )
+    speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
+
+
 class OpenLoopSettings(Settings):
     """Moves the drives to the lengths that the trajectory gives; nothing is fed back."""
 
@@ -134,5 +159,7 @@ class OpenLoopSettings(Settings):
     speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
 
 
-ControllerSettings: TypeAlias = Annotated[IocSettings | OpenLoopSettings, Field(discriminator="kind")]
+ControllerSettings: TypeAlias = Annotated[
+    IocSettings | KinematicSettings | OpenLoopSettings, Field(discriminator="kind")
+]
 """Union of all kinds of controller, told apart by ``kind``."""
