@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
+from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.instantaneous import InstantaneousOptimalControl
 from tcrctl.controller.kinematic import Kinematic
 from tcrctl.controller.literal import LiteralIoc
 from tcrctl.controller.open_loop import OpenLoop
 from tcrctl.controller.settings import ControllerSettings, KinematicSettings, OpenLoopSettings
+from tcrctl.memory import Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
@@ -24,6 +27,14 @@ class Controller(Protocol):
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Command for the coming period, within speed and stroke limits, and how it was found."""
+        ...
+
+    def memory(self) -> Mapping[str, Kept]:
+        """What the next command depends on; see :class:`tcrctl.memory.Remembers`."""
+        ...
+
+    def inner_map(self) -> InnerMap | None:
+        """The iteration of the last step; None if there is none, or it did not end in a solution."""
         ...
 
 

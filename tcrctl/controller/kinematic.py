@@ -11,13 +11,17 @@ of 1/s.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from tcrctl.controller.cost import input_limits, pose_error
+from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.multi_step import follow
 from tcrctl.controller.settings import KinematicSettings, SlackGuard
 from tcrctl.controller.static import rest_map, static_outputs
+from tcrctl.memory import Kept
 from tcrctl.robot.equations import make_workspace
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.potential import Outcome
@@ -74,13 +78,25 @@ class Kinematic:
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
         self._at = rest_map(robot)
         self._integral = IntegralAction(settings.integral, settings.period_s)
+        self._solved = False
+        self._normal = robot.rest_normal if settings.output == "pose" else None
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
         self.ahead = np.array([settings.period_s])
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Integral action."""
+        return self._integral.memory(self._normal)
+
+    def inner_map(self) -> InnerMap | None:
+        """Newton's iteration of the statics at the present drives."""
+        at = self._at
+        return newton_map(self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Command for the coming period; the drives are held if the static map is not known."""
         h, robot = self._settings.period_s, self._robot
         error = pose_error(reference, estimate.position, estimate.normal)
+        self._normal = estimate.normal if self._settings.output == "pose" else None
         shift = self._integral.update(error, bool(self._saturated.any()))
         good, reason = Outcome(False, 0, np.inf, 0.0), "the estimate is not usable"
         tension, gain = estimate.tension, np.zeros((POSE_ROWS + robot.n_cables, robot.n_cables))
@@ -88,6 +104,7 @@ class Kinematic:
             at = self._at
             good = Outcome(*follow(robot.model, self._load, self._work, *at, estimate.drive))
             reason = "" if good.converged else "the model has no stable equilibrium at the present drives"
+        self._solved = good.converged
         if not reason:
             rest, gain = static_outputs(robot.model, self._work, self._at, robot.tip)
             tension = rest[POSE_ROWS:]

@@ -13,14 +13,17 @@ the lightly damped lateral mode out of Δ. See docs/control.md.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.predictor import Forecast
 from tcrctl.controller.settings import IocSettings
+from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
@@ -218,10 +221,30 @@ class MultiStep:
             MAX_ITERATIONS,
             True,
         )
+        self._solved = False
         basis = response.start_basis(robot.model, self._work, settings.modes)
         self._memory = Memory(
             rest.copy(), np.zeros(robot.n_cables), robot.rest.gain.copy(), still, still.copy(), basis
         )
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Offset and last velocities without the fixed base, if the offset moves.
+
+        The basis is left out: it turns within the modes it spans, which changes no response, and with nothing
+        left to correct an error of it has no effect of first order.
+        """
+        if self._blend == 0.0:
+            return {}
+        first = 3 * FIXED
+        return {
+            "offset": Kept(self._memory.offset[first:], POSITION),
+            "last_v": Kept(self._memory.v[first:], SPEED),
+        }
+
+    def inner_map(self) -> InnerMap | None:
+        """Newton's iteration of the statics at the present drives."""
+        at = self._memory
+        return newton_map(self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
     def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""
@@ -234,4 +257,5 @@ class MultiStep:
         outcome = Outcome(*outcome)
         good = outcome.converged and stable
         reason = "" if good else "the model has no stable equilibrium at the present drives"
+        self._solved = outcome.converged
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason)

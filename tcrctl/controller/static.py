@@ -11,16 +11,19 @@ where the robot rests.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.multi_step import block_edges, follow, superpose
 from tcrctl.controller.predictor import Forecast
 from tcrctl.controller.settings import IocSettings
 from tcrctl.elements.sliding_cable import STIFFNESS
+from tcrctl.memory import NORMAL, POSITION, TENSION, Kept
 from tcrctl.robot import linear, pose
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
@@ -132,7 +135,21 @@ class Static:
         offset = settings.offset
         self._blend = 0.0 if offset is None else -float(np.expm1(-settings.period_s / offset.filter_s))
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
+        self._solved = False
         self._at, self._offset = rest_map(robot), np.zeros(POSE_ROWS + robot.n_cables)
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Offset of position, normal, twist and tensions, if it moves."""
+        if self._blend == 0.0:
+            return {}
+        parts = (("position", 0, 3, POSITION), ("normal", 3, 6, NORMAL), ("twist", 6, POSE_ROWS, NORMAL))
+        kept = {f"offset_{name}": Kept(self._offset[a:b], scale) for name, a, b, scale in parts}
+        return {**kept, "offset_tension": Kept(self._offset[POSE_ROWS:], TENSION)}
+
+    def inner_map(self) -> InnerMap | None:
+        """Newton's iteration of the statics at the present drives."""
+        at = self._at
+        return newton_map(self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
     def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""
@@ -143,5 +160,5 @@ class Static:
         )  # fmt: skip
         outcome = Outcome(*outcome)
         reason = "" if outcome.converged else "the model has no stable equilibrium at the present drives"
-        prediction = Prediction(free, gain)
+        prediction, self._solved = Prediction(free, gain), outcome.converged
         return Forecast(prediction, outcome.converged, outcome.iterations, outcome.residual, reason)
