@@ -20,6 +20,7 @@ from tcrctl.cli.recover import recover
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
+from tcrctl.cli.stability import stability
 from tcrctl.cli.validate import validate
 from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
@@ -30,6 +31,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "validate": validate,
     "new": new,
     "schema": schema,
+    "stability": stability,
     "info": info,
     "recover": recover,
     "export": export,

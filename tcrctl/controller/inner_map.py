@@ -18,22 +18,25 @@ class InnerMap(NamedTuple):
     """One iteration about the point at which it ended.
 
     Attributes:
+        what: What is iterated, for a report.
         point: z^(j) at the end (n,).
         scale: Sizes of changes of its components that are small (n,).
         apply: z^(j+1) for any z^(j), both (n,).
     """
 
+    what: str
     point: Array
     scale: Array
     apply: Callable[[Array], Array]
 
 
-def newton_map(robot: Robot, load: Load, drive: Array, q: Array) -> InnerMap:
+def newton_map(what: str, robot: Robot, load: Load, drive: Array, q: Array) -> InnerMap:
     """One full Newton step of r(q) = 0 with the drives held, about a solution.
 
     Its derivative at the solution itself is 0, so what is found there is what the tolerance has left.
 
     Args:
+        what: What is iterated.
         robot: The robot.
         load: Integration rule and loads of the equations (*) of ``robot.equations``.
         drive: Drive lengths (m,) [m].
@@ -52,4 +55,4 @@ def newton_map(robot: Robot, load: Load, drive: Array, q: Array) -> InnerMap:
         return z - step
 
     q = q.copy()
-    return InnerMap(q[first:].copy(), np.full(q.size - first, 1e-3), apply)
+    return InnerMap(what, q[first:].copy(), np.full(q.size - first, 1e-3), apply)

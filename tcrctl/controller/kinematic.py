@@ -89,8 +89,8 @@ class Kinematic:
 
     def inner_map(self) -> InnerMap | None:
         """Newton's iteration of the statics at the present drives."""
-        at = self._at
-        return newton_map(self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
+        what, at = "Newton on the statics", self._at
+        return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Command for the coming period; the drives are held if the static map is not known."""

@@ -138,7 +138,9 @@ class LiteralIoc:
             return np.concatenate([z[:size] + change, solution.inputs])
 
         scale = np.concatenate([np.full(size, POSITION), np.full(speed.size, SPEED)])
-        return InnerMap(np.concatenate([q[first:], speed]), scale, apply)
+        return InnerMap(
+            "(28) with (36): Newton and LCP together", np.concatenate([q[first:], speed]), scale, apply
+        )
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Command for the coming period; the drives are held if (41) was not reached."""

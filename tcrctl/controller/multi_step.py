@@ -243,8 +243,8 @@ class MultiStep:
 
     def inner_map(self) -> InnerMap | None:
         """Newton's iteration of the statics at the present drives."""
-        at = self._memory
-        return newton_map(self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
+        what, at = "Newton on the statics; one LCP after it, not fed back", self._memory
+        return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
     def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""

@@ -45,7 +45,8 @@ class OneStep:
 
     def inner_map(self) -> InnerMap | None:
         """Newton's iteration of the backward-Euler step with the last input held."""
-        return None if self._last is None else newton_map(self._robot, *self._last, self._guess)
+        what = "Newton on the backward-Euler step; one LCP after it, not fed back"
+        return None if self._last is None else newton_map(what, self._robot, *self._last, self._guess)
 
     def _load(self, q: Array, v: Array, drive: Array) -> Load:
         """Backward Euler over the horizon from (q, v, d)."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -60,6 +61,13 @@ class ClosedLoop:
         }
 
 
+class After(NamedTuple):
+    """A loop after a step, and how the controller came to its command."""
+
+    loop: ClosedLoop
+    info: ControlInfo
+
+
 class StepMap:
     """F of the module's docstring about one state, in the scales of :class:`tcrctl.memory.Kept`.
 
@@ -81,17 +89,20 @@ class StepMap:
 
     def __call__(self, deviation: Array) -> Array:
         """State one step after the present state + ``deviation``, both (n,)."""
-        return self._read(self.moved(deviation))
+        return self._read(self.after(deviation).loop)
 
-    def moved(self, deviation: Array) -> ClosedLoop:
-        """The loop one step after the present state + ``deviation`` (n,)."""
+    def after(self, deviation: Array) -> After:
+        """The loop one step after the present state + ``deviation`` (n,).
+
+        Raises:
+            DivergenceError: If the plant's integrator did not converge.
+        """
         loop, first = copy.deepcopy(self._loop), 0
         for name, part in loop.kept().items():
             change = deviation[first : first + part.values.size]
             np.add(part.values, part.scale * self._seen(name, change), out=part.values)
             first += part.values.size
-        loop.step(self._reference)
-        return loop
+        return After(loop, loop.step(self._reference))
 
     def _read(self, loop: ClosedLoop) -> Array:
         kept = loop.kept()
