@@ -68,6 +68,11 @@ def derivative(apply: Map, size: int, step: float, *, central: bool = False) -> 
     return product
 
 
+def jacobian(apply: Map, size: int, step: float) -> Array:
+    """Jacobian of a map at 0, column by column, by central differences; arguments as in :func:`derivative`."""
+    return _columns(derivative(apply, size, step, central=True), size)
+
+
 def largest_eigenvalues(product: Map, start: Array, count: int = 4) -> Spectrum:
     """Find the eigenvalues of largest magnitude of a linear map.
 
@@ -78,7 +83,7 @@ def largest_eigenvalues(product: Map, start: Array, count: int = 4) -> Spectrum:
     """
     size = start.size
     if size <= DENSE:
-        matrix = np.stack([product(e) for e in np.eye(size)], axis=1)
+        matrix = _columns(product, size)
         found = (
             _sorted(np.linalg.eigvals(matrix).astype(np.complex128)) if np.isfinite(matrix).all() else _NONE
         )
@@ -107,6 +112,10 @@ def largest_eigenvalues(product: Map, start: Array, count: int = 4) -> Spectrum:
     except ArpackNoConvergence as error:
         found, converged = error.eigenvalues, False
     return Spectrum(_sorted(found), products, converged)
+
+
+def _columns(product: Map, size: int) -> Array:
+    return np.stack([product(e) for e in np.eye(size)], axis=1)
 
 
 _NONE: NDArray[np.complex128] = np.zeros(0, dtype=np.complex128)

@@ -30,8 +30,8 @@ from tcrctl.trajectory.trajectory import sample_reference
 
 #: Length of a deviation of the loop's state, in the scales of its parts: micrometres per coordinate.
 STEP: Final = 0.03
-#: The same for the inner iteration, which is so stiff that only nanometres are small.
-INNER_STEP: Final = 1e-5
+#: The same for the inner iteration: nanometres, as rods bent by more change the robot's soft directions.
+INNER_STEP: Final = 1e-4
 #: Eigenvalues kept per point.
 COUNT: Final = 4
 #: The map is applied to a random deviation this often before the search begins, so that stiff parts have died out.
@@ -178,5 +178,6 @@ def inner_radius(inner: InnerMap | None) -> float:
         return inner.apply(inner.point + inner.scale * x) / inner.scale
 
     size = inner.point.size
-    start = np.random.default_rng(0).standard_normal(size)
-    return largest_eigenvalues(derivative(scaled, size, INNER_STEP, central=True), start, 1).radius
+    product = derivative(scaled, size, INNER_STEP, central=True)
+    start = product(product(np.random.default_rng(0).standard_normal(size)))
+    return largest_eigenvalues(product, start, 1).radius if start.any() else 0.0
