@@ -16,6 +16,7 @@ from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
+from tcrctl.cli.paper import paper
 from tcrctl.cli.recover import recover
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
@@ -35,6 +36,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "info": info,
     "recover": recover,
     "export": export,
+    "paper": paper,
 }
 
 
