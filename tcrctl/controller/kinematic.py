@@ -4,9 +4,8 @@
     u = J⁺ (dy_d/dt + k (y_d + shift - y)) + Z z
 
 J⁺ is the damped pseudo-inverse [NH86], positions in m and normals times a lever. Z spans the drives that leave the
-end where it is; z moves the model's tensions towards a reference. There is no horizon, no cost and no inertia: a
-slow mode of damping ζ and frequency ω, which the map does not know, bounds the gain k by about 2 ζ ω, some tenths
-of 1/s.
+end where it is; z moves the model's tensions towards a reference. There is no horizon, no cost and no inertia: the
+lightly damped slow modes, which the map does not know, bound the gain k at about 1 1/s.
 """
 
 from __future__ import annotations
