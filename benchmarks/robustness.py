@@ -2,8 +2,9 @@
 
     python benchmarks/robustness.py [--jobs N] [--only WORD] [--json]
 
-Every cell is a whole run on the mismatched, noisy, late plant of the shipped experiments, with one thing more. Errors are those of
-the plant's true end ring. Exit code 1 if a run diverges, an error is larger than 10 mm or 5 deg, or a step did not converge.
+Every cell is a whole run on the mismatched, noisy, late plant of the shipped experiments, one thing changed. Errors
+are those of the plant's true end ring. Exit code 1 if a run diverges, an error is larger than 10 mm or 5 deg, or a
+step did not converge.
 """
 
 from __future__ import annotations
