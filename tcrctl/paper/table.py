@@ -58,7 +58,7 @@ def ending(name: str) -> Callable[[Sequence[Result]], str]:
         (result,) = results
         (value,) = found(result, name)
         if result["status"] == "aborted":
-            return f"diverges, stopped at {result['duration_s']:.3g} s"
+            return f"stopped at {result['duration_s']:.3g} s with {value:.3g}"
         return f"{value:.3g}"
 
     return tell
