@@ -1,0 +1,1 @@
+"""Stand-ins for the devices of the bench, with encoders of their own."""
