@@ -12,12 +12,17 @@ from typing import Annotated
 import typer
 
 from tcrctl import __version__
+from tcrctl.cli.diff import diff
 from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.paper import paper
+from tcrctl.cli.play import play
+from tcrctl.cli.plot import plot
 from tcrctl.cli.recover import recover
+from tcrctl.cli.replay import replay
+from tcrctl.cli.report import report
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
@@ -37,6 +42,11 @@ VERBS: dict[str, Callable[..., None]] = {
     "recover": recover,
     "export": export,
     "paper": paper,
+    "replay": replay,
+    "diff": diff,
+    "play": play,
+    "plot": plot,
+    "report": report,
 }
 
 
