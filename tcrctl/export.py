@@ -48,7 +48,7 @@ def export_csv(
         LogError: If the log is damaged or ``out`` cannot be written.
     """
     log = read_log(path)
-    wanted = [name for name, column in COLUMNS.items() if nodes or column.field not in PER_NODE]
+    wanted = [name for name, column in COLUMNS.items() if nodes or not _per_node(column)]
     table: dict[str, NDArray[Any]] = {}
     for name, values in log.columns(wanted).items():
         table |= _flat(name, values, log)
@@ -85,6 +85,12 @@ def export_npz(
     with _create(Path(out), force, binary=True) as stream:
         np.savez_compressed(stream, **arrays)
     return list(arrays)
+
+
+def _per_node(column: Column) -> bool:
+    """Whether a quantity has so many numbers that a table is better off without."""
+    raw = column.path.startswith("measurement.raw.") and column.kind.endswith("[]")
+    return raw or column.field in PER_NODE
 
 
 def _create(out: Path, force: bool, *, binary: bool = False) -> Any:

@@ -14,6 +14,7 @@ from tcrctl.signals import (
     ControlInfo,
     Estimate,
     Measurement,
+    RawFrame,
     Reference,
     StepRecord,
     Timing,
@@ -24,6 +25,7 @@ _RECORDS: Final[dict[str, type]] = {
     "Step": StepRecord,
     "Reference": Reference,
     "Measurement": Measurement,
+    "RawFrame": RawFrame,
     "Estimate": Estimate,
     "Command": Command,
     "ControlInfo": ControlInfo,
@@ -37,6 +39,7 @@ _DTYPES: Final[dict[str, np.dtype[Any]]] = {
     "double[]": np.dtype("<f8"),
     "float[]": np.dtype("<f4"),
     "bool[]": np.dtype(np.bool_),
+    "int32[]": np.dtype("<i4"),
 }
 
 
