@@ -223,3 +223,7 @@ class ArmingRefusedError(StoppedError):
     def __init__(self, reasons: Sequence[str], *, hint: str = "") -> None:
         super().__init__(f"the drives are not armed: {'; '.join(reasons)}", hint=hint)
         self.reasons = tuple(reasons)
+
+
+class UntrustworthyDeviceError(DeviceError):
+    """A device answers, but what it says cannot be true; waiting or asking again does not help."""

@@ -17,11 +17,13 @@ from tcrctl.controller.settings import ControllerSettings, IocSettings
 from tcrctl.criterion import CriterionText
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
-from tcrctl.plant.settings import PlantSettings
+from tcrctl.plant.rig_file import LoadedRig, load_rig
+from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
 from tcrctl.settings import Path as Keys
 from tcrctl.settings import Settings, quantity, refuse
+from tcrctl.kind_switch import without_former_keys
 from tcrctl.summary import TASK, UNITS
 from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.settings import TrajectorySettings
@@ -86,6 +88,8 @@ def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
             ("trajectory", "kind"),
             f"must be drives with controller.kind: open_loop, not {spec.trajectory.kind}",
         )
+    if not isinstance(spec.plant, SimulatedSettings):
+        return
     step, period = spec.plant.step_ms, spec.controller.period_s
     steps = period * 1e3 / step
     if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
@@ -100,7 +104,8 @@ def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Key
         spec: The experiment.
         robot: Its robot.
     """
-    count, rings = robot.modules.count, spec.plant.measured_rings
+    plant, count = spec.plant, robot.modules.count
+    rings = plant.measured_rings if isinstance(plant, SimulatedSettings) else "all"
     for i, ring in enumerate(() if rings == "all" else rings):
         if ring > count:
             yield (
@@ -134,6 +139,8 @@ class LoadedSpec:
         path: The file.
         robot_path: File of the robot.
         overrides: ``--set`` arguments, already applied.
+        rig: The bench, for ``plant.kind: rig``.
+        notes: What the user should know about how the file was read.
     """
 
     spec: ExperimentSpec
@@ -142,6 +149,8 @@ class LoadedSpec:
     path: Path
     robot_path: Path
     overrides: tuple[str, ...]
+    rig: LoadedRig | None = None
+    notes: tuple[str, ...] = ()
 
 
 def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
@@ -159,7 +168,9 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     path = shipped.find_experiment(name_or_path)
     given = strict_yaml.read(path)
     document = strict_yaml.loads(given, str(path))
+    written = document.data
     document, problems = _overridden(document, overrides)
+    document, notes = without_former_keys(document, written, ExperimentSpec)
     spec, robot, robot_path = _validated(document, path.parent, problems)
     problems = [
         Problem(document.where(keys), ".".join(map(str, keys)), message)
@@ -167,7 +178,8 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     ]
     if problems:
         raise SpecError(problems)
-    return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides))
+    rig = load_rig(spec.plant.rig, robot, path.parent) if isinstance(spec.plant, RigSettings) else None
+    return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, notes)
 
 
 def _overridden(

@@ -60,5 +60,14 @@ class SimulatedSettings(Settings):
     measured_rings: Rings = Field(default="all", description="rings whose three nodes carry markers")
 
 
-PlantSettings: TypeAlias = SimulatedSettings
+class RigSettings(Settings):
+    """The real robot, measured by cameras and moved by drives; always paced by the clock."""
+
+    kind: Literal["rig"]
+    rig: str = Field(description="shipped rig, or path of a rig file relative to this one", min_length=1)
+
+
+PlantSettings: TypeAlias = Annotated[
+    SimulatedSettings | RigSettings, Field(discriminator="kind", description="what is controlled")
+]
 """Union of all kinds of plant, told apart by ``kind``."""

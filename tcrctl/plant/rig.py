@@ -1,0 +1,293 @@
+"""The real robot: cameras measure it, drives move it, the supervisor decides whether they may.
+
+    start:  connect -> measure -> ready? -> enable -> armed, set-points = present positions
+    read:   drive status -> next camera frame -> supervisor
+    write:  speed -> set-points within limits -> one exchange -> supervisor -> what was really sent
+    close:  controlled stop -> standstill -> disarmed
+
+Times are those of the run: a measurement carries the middle of its exposure. When the supervisor wants the run to
+end, ``read`` or ``write`` raises its reason; ``close`` then brings the drives to rest whatever has happened.
+"""  # fmt: skip
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from tcrctl.errors import ArmingRefusedError, DeviceError, TcrctlError, UntrustworthyDeviceError
+from tcrctl.plant.devices import Cameras, DriveControl, Drives, DriveStatus, Sighting
+from tcrctl.plant.session import Session
+from tcrctl.plant.set_points import Clamp, DriveEnvelope, Micrometres, SetPoints
+from tcrctl.plant.supervisor import Rules, Sight, State, Supervisor
+from tcrctl.signals import Command, Measurement, Truth
+
+#: How often the drives are written to while they are armed or stopped outside the control loop [s].
+CYCLE: Final = 0.02
+#: A drive that moves less than this in a cycle stands still [um].
+STILL: Final = 20
+#: A tick waits for a frame at most this many frame intervals, then goes on with what it knows.
+PATIENCE: Final = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class RigLimits:
+    """What a rig must keep.
+
+    Attributes:
+        envelope: Limits of the set-points.
+        rules: Limits of the supervisor.
+        min_seen: Share of the mapped markers that makes a measurement usable.
+        mapped: Number of mapped markers.
+        arm_timeout: Time in which the drives must be on [s].
+    """
+
+    envelope: DriveEnvelope
+    rules: Rules
+    min_seen: float
+    mapped: int
+    arm_timeout: float
+
+
+class RigPlant:
+    """See the module's docstring."""
+
+    def __init__(
+        self,
+        cameras: Cameras,
+        drives: Drives,
+        limits: RigLimits,
+        period: float,
+        session: Session,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Take over open devices; they are closed with the plant.
+
+        Args:
+            cameras: Stream of marker frames.
+            drives: The cable drives.
+            limits: What must be kept.
+            period: Control period [s].
+            session: The run.
+            clock: Never jumps; that of the camera frames [s].
+            sleep: Waits for a time [s].
+        """
+        self._cameras, self._drives, self._limits = cameras, drives, limits
+        self._period, self._session, self._clock, self._sleep = period, session, clock, sleep
+        self.supervisor = Supervisor(limits.rules, session.report)
+        self._points: SetPoints | None = None
+        self._status: DriveStatus | None = None
+        self._answered, self._trouble, self._permanent, self._rejects = clock(), "", False, 0
+        self._seen: Sighting | None = None
+        self._usable_at = -np.inf
+        self._clamped: dict[tuple[str, str], int] = {}
+
+    # --- the loop ---
+
+    def read(self) -> Measurement:
+        """The next camera frame, and where the drives are.
+
+        If no frame comes in time, no marker of the measurement is valid.
+
+        Raises:
+            RigStopError: If the supervisor ends the run.
+            DeviceError: If a device is lost.
+        """
+        self._ask(self._drives.status)
+        sighting = self._cameras.next(PATIENCE / self._cameras.rate)
+        measured = self._measurement(sighting)
+        self._supervise()
+        return measured
+
+    def write(self, command: Command) -> Command:
+        """Send set-points for one period; returns what was really sent.
+
+        While the supervisor holds, the last accepted set-points are sent again.
+
+        Raises:
+            RigStopError: If the supervisor ends the run.
+            DeviceError: If a device is lost.
+        """
+        points = self._points
+        if points is None:
+            raise ArmingRefusedError(["the rig was never started"])
+        self.supervisor.run()
+        before = points.accepted
+        moving = self.supervisor.state is State.RUNNING
+        target, clamps = points.propose(command.speed if moving else np.zeros_like(command.speed))
+        self._note_clamps(clamps)
+        taken = self._exchange(target, self.supervisor.control)
+        points.accept() if taken else points.reject()
+        self._supervise()
+        return Command(1e-6 * (points.accepted - before) / self._period, 1e-6 * points.accepted)
+
+    def truth(self) -> Truth | None:
+        """A rig does not know more than it measures."""
+        return None
+
+    # --- before and after it ---
+
+    def start(self) -> None:
+        """Arm the drives without a bump: set-points begin where the drives are.
+
+        Raises:
+            ArmingRefusedError: If a condition is not met; nothing has moved.
+            DeviceError: If the drives are lost.
+        """
+        self._ask(self._drives.status)
+        self._measurement(self._cameras.next(PATIENCE / self._cameras.rate))
+        self.supervisor.check_ready(self._sight(), confirmed=self._session.confirmed)
+        self.arm(f"operator agreed; measurement {1e3 * self._sight().age:.0f} ms old")
+
+    def arm(self, cause: str) -> None:
+        """Switch the drives on and wait until they are; see :meth:`start`, which also looks at the cameras."""
+        on, begun = DriveControl(enable=True, permit=True), self._clock()
+        try:
+            while True:
+                position = self.position()
+                self._check_within(position)
+                self._exchange(position, on)
+                if self._trouble and self._clock() - self._answered > self._limits.rules.silence:
+                    raise DeviceError(f"the drives do not answer: {self._trouble}")
+                status = self._status
+                if status is not None and status.enabled and status.acknowledged and not self._trouble:
+                    break
+                if self._clock() - begun > self._limits.arm_timeout:
+                    why = (status.fault if status else "") or "they do not say why"
+                    raise ArmingRefusedError([f"the drives are not on after {self._limits.arm_timeout:g} s: {why}"])
+                self._sleep(CYCLE)
+        except TcrctlError:
+            self._exchange(self.position(), DriveControl())
+            raise
+        self._points = SetPoints(self._limits.envelope, self._period, self.position().tolist())
+        self.supervisor.arm(cause)
+
+    def close(self) -> None:
+        """Bring the drives to rest, switch them off and end the connections.
+
+        Raises:
+            DeviceError: If the drives did not come to rest, and nothing else had gone wrong before.
+        """
+        before = self.supervisor.failure
+        try:
+            self._come_to_rest()
+            if self._points is not None:
+                self._exchange(self.position(), DriveControl())
+        finally:
+            self._cameras.close()
+            self._drives.close()
+        if before is None and self.supervisor.failure is not None:
+            raise self.supervisor.failure
+
+    def position(self) -> Micrometres:
+        """Where the drives were when they answered last (m,) [um].
+
+        Raises:
+            DeviceError: If they never did.
+        """
+        if self._status is None:
+            raise DeviceError(f"the drives do not answer: {self._trouble}")
+        return self._status.position
+
+    def look(self) -> Sight:
+        """Ask cameras and drives once and return what is known, without any consequence."""
+        self._ask(self._drives.status)
+        self._measurement(self._cameras.next(PATIENCE / self._cameras.rate))
+        return self._sight()
+
+    def _come_to_rest(self) -> None:
+        self.supervisor.stop(self._clock(), "end of the run")
+        while self.supervisor.state is State.STOPPING:
+            before = self.position()
+            self._exchange(before, self.supervisor.control)
+            moved = bool(np.any(np.abs(self.position() - before) > STILL))
+            if self.supervisor.rest(self._clock(), self._sight(), moved=moved) is State.STOPPING:
+                self._sleep(CYCLE)
+
+    # --- devices ---
+
+    def _ask(self, question: Callable[[], DriveStatus]) -> bool:
+        """Whether the drives answered; what they said and what went wrong is kept."""
+        try:
+            self._status = question()
+        except DeviceError as error:
+            self._trouble, self._permanent = str(error), isinstance(error, UntrustworthyDeviceError)
+            return False
+        self._answered, self._trouble, self._permanent = self._clock(), "", False
+        return True
+
+    def _exchange(self, target: Micrometres, control: DriveControl) -> bool:
+        """Whether the drives took the set-points."""
+        if not self._ask(lambda: self._drives.exchange(target, control)):
+            return False
+        refused = bool(control.follow and self._status is not None and self._status.reject)
+        self._rejects = self._rejects + 1 if refused else 0
+        return not refused
+
+    def _measurement(self, sighting: Sighting | None) -> Measurement:
+        now, run_time = self._clock(), self._session.time()
+        drive = np.zeros(0) if self._status is None else 1e-6 * self._status.position
+        if sighting is None:
+            return self._blind(run_time, drive)
+        self._seen = sighting
+        if np.count_nonzero(sighting.valid) >= self._limits.min_seen * self._limits.mapped:
+            self._usable_at = sighting.taken
+        taken = run_time - (now - sighting.taken)
+        return Measurement(taken, sighting.nodes, sighting.valid, drive, sighting.raw)
+
+    def _blind(self, t: float, drive: np.ndarray) -> Measurement:
+        """What is known if no frame came: where the markers were last, none of them valid."""
+        seen = self._seen
+        nodes = np.zeros((self._limits.mapped, 3), np.float32) if seen is None else seen.nodes
+        return Measurement(t, nodes, np.zeros(len(nodes), np.bool_), drive)
+
+    # --- supervision ---
+
+    def _sight(self) -> Sight:
+        now, following, laggard = self._clock(), 0, ""
+        if self._points is not None and self._status is not None:
+            error = np.abs(self._status.position - self._points.accepted)
+            worst = int(np.argmax(error))
+            following, laggard = int(error[worst]), self._limits.envelope.names[worst]
+        return Sight(
+            age=now - self._usable_at,
+            status=self._status,
+            silence=now - self._answered if self._trouble else 0.0,
+            trouble=self._trouble,
+            following=following,
+            laggard=laggard,
+            permanent=self._permanent,
+            rejects=self._rejects,
+        )
+
+    def _supervise(self) -> None:
+        self.supervisor.watch(self._clock(), self._sight())
+        if self.supervisor.failure is not None:
+            raise self.supervisor.failure
+
+    def _check_within(self, position: Micrometres) -> None:
+        e = self._limits.envelope
+        outside = np.flatnonzero((position < e.low) | (position > e.high))
+        if outside.size:
+            reasons = [
+                f"cable {e.names[c]} is at {position[c] / 1e3:.2f} mm, outside its limits "
+                f"{e.low[c] / 1e3:g} to {e.high[c] / 1e3:g} mm"
+                for c in outside
+            ]
+            raise ArmingRefusedError(reasons, hint="Bring it inside with the PLC's own manual mode.")
+
+    def _note_clamps(self, clamps: tuple[Clamp, ...]) -> None:
+        """Report where clamping begins and ends; every step's wanted and sent values are in its record."""
+        now = {(clamp.cable, clamp.rule): clamp for clamp in clamps}
+        for key in [key for key in self._clamped if key not in now]:
+            steps = self._clamped.pop(key)
+            self._session.report("clamp", "info", f"cable {key[0]}: {key[1]}: over after {steps} steps")
+        for key, clamp in now.items():
+            if key not in self._clamped:
+                self._session.report("clamp", "warning", str(clamp))
+            self._clamped[key] = self._clamped.get(key, 0) + 1
