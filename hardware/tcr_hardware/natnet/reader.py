@@ -1,0 +1,120 @@
+"""A cursor over one payload that never reads past its end and never believes a count."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from tcr_hardware.natnet.errors import MalformedPacketError
+
+#: Named things in one packet. A real one has hundreds; the limit bounds what a corrupt packet can cost.
+MOST_ITEMS = 2000
+LONGEST_NAME = 256
+_INTEGER = struct.Struct("<i")
+
+
+class Reader:
+    """Reads numbers, names and arrays one after the other.
+
+    Attributes:
+        buffer: The payload; arrays are views of it.
+        offset: Next byte to be read.
+        end: First byte that must not be read.
+    """
+
+    __slots__ = ("_items", "buffer", "end", "offset")
+
+    def __init__(self, buffer: bytes, most_items: int = MOST_ITEMS) -> None:
+        self.buffer, self.offset, self.end = buffer, 0, len(buffer)
+        self._items = most_items
+
+    @property
+    def remaining(self) -> int:
+        """Bytes not yet read."""
+        return self.end - self.offset
+
+    def fail(self, problem: str) -> MalformedPacketError:
+        """Make the error that tells where ``problem`` was noticed."""
+        return MalformedPacketError(problem, self.offset, len(self.buffer))
+
+    def integer(self) -> int:
+        """Read an i32.
+
+        Raises:
+            MalformedPacketError: The payload ends.
+        """
+        return int(self.unpack(_INTEGER)[0])
+
+    def unpack(self, layout: struct.Struct) -> tuple[Any, ...]:
+        """Read a fixed group of numbers.
+
+        Raises:
+            MalformedPacketError: The payload ends.
+        """
+        start, self.offset = self.offset, self.offset + layout.size
+        if self.offset > self.end:
+            raise self.fail("payload ends inside a number")
+        return layout.unpack_from(self.buffer, start)
+
+    def count(self, what: str, smallest: int) -> int:
+        """Read the number of things that follow, each of at least ``smallest`` bytes.
+
+        Raises:
+            MalformedPacketError: Negative, or more than the rest of the payload can hold.
+        """
+        count = self.integer()
+        if not 0 <= count * smallest <= self.end - self.offset:
+            raise self.fail(f"{count} {what} do not fit")
+        return count
+
+    def items(self, what: str, smallest: int) -> int:
+        """Read the number of named things that follow; as ``count``, with a limit for the whole packet.
+
+        Raises:
+            MalformedPacketError: As ``count``, or more than any real packet has.
+        """
+        count = self.count(what, smallest)
+        self._items -= count
+        if self._items < 0:
+            raise self.fail(f"{count} {what} are more than a packet may have")
+        return count
+
+    def text(self) -> str:
+        """Read a name that ends with a zero byte.
+
+        Raises:
+            MalformedPacketError: No zero byte within ``LONGEST_NAME`` bytes.
+        """
+        stop = self.buffer.find(b"\0", self.offset, min(self.end, self.offset + LONGEST_NAME))
+        if stop < 0:
+            raise self.fail("name without end")
+        start, self.offset = self.offset, stop + 1
+        return self.buffer[start:stop].decode("utf-8", "replace")
+
+    def array(self, dtype: DTypeLike, count: int, stride: int | None = None) -> NDArray[Any]:
+        """Read ``count`` elements as a read-only view, ``stride`` bytes apart if they are longer than known.
+
+        Raises:
+            MalformedPacketError: The payload ends, or the elements are shorter than known.
+        """
+        known = np.dtype(dtype)
+        size = known.itemsize if stride is None else stride
+        start, self.offset = self.offset, self.offset + count * size
+        if self.offset > self.end or size < known.itemsize:
+            raise self.fail("payload ends inside an array")
+        if size == known.itemsize:
+            return np.frombuffer(self.buffer, known, count, start)
+        return np.ndarray((count,), known, self.buffer, start, (size,))
+
+    def skip(self, size: int) -> None:
+        """Pass over ``size`` bytes.
+
+        Raises:
+            MalformedPacketError: Negative or more than there are.
+        """
+        if not 0 <= size <= self.remaining:
+            raise self.fail(f"{size} bytes do not fit")
+        self.offset += size
