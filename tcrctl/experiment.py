@@ -19,7 +19,9 @@ from tcrctl.feasibility import DriveLimits, StaticPath, check_drives, check_feas
 from tcrctl.loop import run_loop, step_count
 from tcrctl.metrics import Metrics
 from tcrctl.pacing import Unpaced
+from tcrctl.plant.bench import build_rig
 from tcrctl.plant.plant import Plant
+from tcrctl.plant.session import Session
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
@@ -37,7 +39,7 @@ START_READS: Final = 10
 WARM_UP_STEPS: Final = 3
 
 Notify = Callable[[str], None]
-PlantBuilder = Callable[["Experiment"], tuple[Plant, State | None]]
+PlantBuilder = Callable[["Experiment", Session], tuple[Plant, State | None]]
 
 
 def silent(text: str) -> None:
@@ -71,6 +73,11 @@ class Experiment:
         return step_count(self.trajectory.duration, self.period)
 
     @property
+    def paced(self) -> bool:
+        """Whether the clock paces every run: a rig cannot be told to wait."""
+        return self.loaded.rig is not None
+
+    @property
     def safety(self) -> SafetyLimits:
         """When a run is stopped."""
         return SafetyLimits(1e-3 * self.spec.safety.position_error_mm, self.robot.tension_limit)
@@ -96,14 +103,23 @@ class Parts:
     start_offset: float
 
 
-def _simulated(experiment: Experiment) -> tuple[Plant, State]:
+def _simulated(experiment: Experiment, session: Session) -> tuple[Plant, State]:
+    del session
     spec = experiment.spec
+    if not isinstance(spec.plant, SimulatedSettings):
+        raise InputError(f"plant.kind is {spec.plant.kind}, not simulated")
     plant = SimulatedPlant(spec.plant, experiment.robot, experiment.period, spec.seed)
     return plant, plant.state
 
 
+def _rig(experiment: Experiment, session: Session) -> tuple[Plant, None]:
+    if experiment.loaded.rig is None:
+        raise InputError("the experiment was loaded without a rig file")
+    return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, session), None
+
+
 #: Plant, and its true state if it knows it, for every ``plant.kind``.
-PLANTS: Final[Mapping[str, PlantBuilder]] = {"simulated": _simulated}
+PLANTS: Final[Mapping[str, PlantBuilder]] = {"simulated": _simulated, "rig": _rig}
 
 
 def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = silent) -> Experiment:
@@ -152,13 +168,18 @@ def plan(experiment: Experiment) -> StaticPath:
     return check_feasibility(experiment.trajectory, robot, limits)
 
 
-def build_plant(experiment: Experiment) -> tuple[Plant, State | None]:
+def build_plant(experiment: Experiment, session: Session | None = None) -> tuple[Plant, State | None]:
     """Build the plant; returns its true state too if it knows it.
+
+    Args:
+        experiment: What it is for.
+        session: What the plant may know of the run.
 
     Raises:
         DeviceError: If it cannot be reached.
+        InputError: If a rig does not do what its file says.
     """
-    return PLANTS[experiment.spec.plant.kind](experiment)
+    return PLANTS[experiment.spec.plant.kind](experiment, session or Session())
 
 
 def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> Parts:

@@ -41,7 +41,9 @@ def without_former_keys(
         if lost:
             data[section] = {key: value for key, value in after.items() if key not in lost}
             names = ", ".join(f"{section}.{key}" for key in lost)
-            notes.append(f"{names}: left out, because {section}.kind is {after['kind']}, not {before['kind']}")
+            notes.append(
+                f"{names}: left out, because {section}.kind is {after['kind']}, not {before['kind']}"
+            )
     return replace(document, data=data), tuple(notes)
 
 

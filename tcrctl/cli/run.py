@@ -28,6 +28,7 @@ Seed = Annotated[
     int | None, typer.Option("--seed", metavar="N", min=0, max=2**63 - 1, help="Seed of everything random.")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Run even if the trajectory seems infeasible.")]
+Yes = Annotated[bool, typer.Option("--yes", help="A rig: the drives may be armed and move; nobody is asked.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
@@ -39,6 +40,7 @@ def run(
     out: Out = Path("logs"),
     seed: Seed = None,
     force: Force = False,
+    yes: Yes = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
@@ -53,15 +55,21 @@ def run(
       tcrctl run letter_t --set plant.mismatch=off --seed 7
       tcrctl run my_experiment.yaml --dry-run
       tcrctl run letter_t --json --out /data/runs | jq .position_error_mm.max
+      tcrctl run letter_t --set plant.kind=rig --set plant.rig=loopback   (see: tcrctl emulate --help)
     """
+    from tcrctl.cli.consent import ask, check_can_ask
     from tcrctl.interruption import signals_exit
     from tcrctl.spec import load_spec
 
     say: Notify = _nothing if quiet else _say
     with signals_exit():
         loaded = load_spec(spec, overrides or ())
+        for note in loaded.notes:
+            say(f"note: {note}")
         say(_headline(loaded))
         if not dry_run:
+            if loaded.rig is not None and not yes:
+                check_can_ask()
             _get_ready(out)
         from tcrctl.experiment import prepare
 
@@ -70,6 +78,8 @@ def run(
     if dry_run:
         print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
         return
+    if loaded.rig is not None and not yes:
+        ask(f"{loaded.robot.name} on rig {loaded.rig.rig.name} will move for {_length(experiment)}.")
     summary = _run(experiment, out, realtime, say, quiet=quiet)
     if summary.reason:
         print(f"{'error' if summary.exit_code != 3 else summary.status}: {summary.reason}", file=sys.stderr)
@@ -93,7 +103,13 @@ def _run(experiment: Experiment, out: Path, realtime: bool, say: Notify, *, quie
     from tcrctl.run import run_experiment
 
     with _progress_bar(experiment.spec.name, shown=not quiet) as progress:
-        return run_experiment(experiment, out=out, realtime=realtime, notify=say, progress=progress)
+        return run_experiment(
+            experiment, out=out, realtime=realtime, confirmed=True, notify=say, progress=progress
+        )
+
+
+def _length(experiment: Experiment) -> str:
+    return f"{experiment.steps * experiment.period:.0f} s"
 
 
 def _planned(experiment: Experiment, force: bool, say: Notify) -> StaticPath | None:

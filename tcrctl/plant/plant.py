@@ -10,6 +10,15 @@ from tcrctl.signals import Command, Measurement, Truth
 class Plant(Protocol):
     """A robot that can be measured and driven."""
 
+    def start(self) -> None:
+        """Get ready to be driven: a rig arms its drives, a simulation has nothing to do.
+
+        Raises:
+            StoppedError: If it must not be driven now.
+            DeviceError: If it cannot.
+        """
+        ...
+
     def read(self) -> Measurement:
         """The newest measurement."""
         ...

@@ -41,7 +41,8 @@ class RigLimits:
         envelope: Limits of the set-points.
         rules: Limits of the supervisor.
         min_seen: Share of the mapped markers that makes a measurement usable.
-        mapped: Number of mapped markers.
+        mapped: Number of ring nodes that carry a marker.
+        nodes: Number of all ring nodes.
         arm_timeout: Time in which the drives must be on [s].
     """
 
@@ -49,6 +50,7 @@ class RigLimits:
     rules: Rules
     min_seen: float
     mapped: int
+    nodes: int
     arm_timeout: float
 
 
@@ -159,7 +161,9 @@ class RigPlant:
                     break
                 if self._clock() - begun > self._limits.arm_timeout:
                     why = (status.fault if status else "") or "they do not say why"
-                    raise ArmingRefusedError([f"the drives are not on after {self._limits.arm_timeout:g} s: {why}"])
+                    raise ArmingRefusedError(
+                        [f"the drives are not on after {self._limits.arm_timeout:g} s: {why}"]
+                    )
                 self._sleep(CYCLE)
         except TcrctlError:
             self._exchange(self.position(), DriveControl())
@@ -243,7 +247,7 @@ class RigPlant:
     def _blind(self, t: float, drive: np.ndarray) -> Measurement:
         """What is known if no frame came: where the markers were last, none of them valid."""
         seen = self._seen
-        nodes = np.zeros((self._limits.mapped, 3), np.float32) if seen is None else seen.nodes
+        nodes = np.zeros((self._limits.nodes, 3), np.float32) if seen is None else seen.nodes
         return Measurement(t, nodes, np.zeros(len(nodes), np.bool_), drive)
 
     # --- supervision ---

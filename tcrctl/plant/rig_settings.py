@@ -31,7 +31,9 @@ class CameraSettings(Settings):
     )
     allow_newer: bool = Field(default=False, description="decode versions newer than those that were tested")
     up_axis: Literal["y", "z"] = Field(default="y", description="as set in Motive; only for rig calibrate")
-    jump_gate_mm: float = quantity("mm", "a marker that jumps further between two frames is not used", 15, gt=0)
+    jump_gate_mm: float = quantity(
+        "mm", "a marker that jumps further between two frames is not used", 15, gt=0
+    )
     max_residual_mm: float | None = quantity("mm", "markers with a larger residual are not used", None, gt=0)
 
 
@@ -82,7 +84,9 @@ class Calibration(Settings):
 class _Plc(Settings):
     unit: int = Field(default=1, ge=0, le=247, description="Modbus unit (slave) number")
     timeout_ms: float = quantity("ms", "how long an answer is waited for", 60.0, gt=0, le=1000)
-    retries: int = Field(default=1, ge=0, le=3, description="an exchange without an answer is repeated so often")
+    retries: int = Field(
+        default=1, ge=0, le=3, description="an exchange without an answer is repeated so often"
+    )
     exchange: Literal["auto", "fc23", "fc16_fc3"] = Field(default="auto", description="function codes used")
     word_order: Literal["auto", "high_first", "low_first"] = "high_first"
     byte_order: Literal["auto", "big", "little"] = "big"
@@ -131,7 +135,9 @@ class MountedRobot(Settings):
     """One robot on this bench: its drives, its markers, where it hangs."""
 
     plc: Annotated[ModbusTcp | ModbusRtu, Field(discriminator="kind")]
-    cables: dict[str, CableDrive] = Field(min_length=1, description="drive of every cable of the robot, by name")
+    cables: dict[str, CableDrive] = Field(
+        min_length=1, description="drive of every cable of the robot, by name"
+    )
     antagonists: tuple[Antagonists, ...] = ()
     markers: MarkerSettings
     calibration: Calibration = Calibration()
@@ -162,7 +168,9 @@ def _contradictions(robot: MountedRobot) -> Iterator[tuple[Keys, str]]:
 class SafetyRules(Settings):
     """When the supervisor holds or stops the drives."""
 
-    stale_after_ms: float = quantity("ms", "age of the measurement from which the drives are held", 50.0, gt=0)
+    stale_after_ms: float = quantity(
+        "ms", "age of the measurement from which the drives are held", 50.0, gt=0
+    )
     stale_stop_ms: float = quantity("ms", "age from which the run is stopped", 200.0, gt=0)
     min_seen_fraction: float = quantity(
         "1", "share of the mapped markers that a usable measurement must show", 0.3, gt=0, le=1
@@ -197,5 +205,3 @@ class RigFile(Settings):
     fifo_priority: int | None = Field(
         default=None, ge=1, le=99, description="SCHED_FIFO priority of the control thread; null: normal"
     )
-
-

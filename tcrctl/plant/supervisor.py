@@ -1,16 +1,15 @@
 """Safety supervisor of a rig: the one state machine that decides whether the drives may move.
 
-                        +----------------------------------------------+
-                        v                                              | standstill
-    ZEROING <------> DISARMED --operator, zeroed, fresh, echo--> ARMED |
-        |               ^                                         |  \ |
-        |               | operator's reset           first command|   \| stop asked, cameras lost,
-        |               |                                         v    v drives lost, rejects,
-        +--fault--> FAULTED <--e-stop, watchdog, PLC fault--- RUNNING --> STOPPING   following error
-                        ^                                      |   ^        |
-                        |                     doubt: stale,    v   | all    |
-                        |                     one lost answer HOLDING well  |
-                        +-------------- no standstill in time --------------+
+        operator's zeroing            operator agrees; zeroed, fresh measurement, echo
+    ZEROING <------------> DISARMED ------------------------------------------------> ARMED
+       |                    ^  ^                                                       |
+       |  operator's reset  |  | standstill                              first command |
+       |                    |  |                                                       v
+       |                    |  STOPPING <--stop asked, cameras or drives lost,---- RUNNING
+       |                    |     |        drive lags, set-points refused            ^   |
+       |                    |     | no standstill in time                   all well |   | doubt: stale, one
+       |                    |     v                                                  |   v lost answer
+       +------fault------> FAULTED <--e-stop, watchdog, PLC fault--- any of those -- HOLDING
 
 What the states tell the drives:
 
@@ -26,7 +25,7 @@ What the states tell the drives:
 Rules: no motion is resumed after STOPPING or FAULTED without arming again; every transition is reported with its
 cause. This is not a safety function: the emergency stop is hard-wired, and if this program dies the watchdog
 in the PLC stops the drives. See docs/bench.md.
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 
