@@ -17,13 +17,13 @@ from tcrctl.controller.settings import ControllerSettings, IocSettings
 from tcrctl.criterion import CriterionText
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
+from tcrctl.kind_switch import without_former_keys
 from tcrctl.plant.rig_file import LoadedRig, load_rig
 from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
 from tcrctl.settings import Path as Keys
 from tcrctl.settings import Settings, quantity, refuse
-from tcrctl.kind_switch import without_former_keys
 from tcrctl.summary import TASK, UNITS
 from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.settings import TrajectorySettings

@@ -10,19 +10,18 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 from tcr_hardware.calibration import RigidTransform
-from tcr_hardware.errors import HardwareError
 from tcr_hardware.markers import MarkerMap, MarkerMapError, NodeMarker
+
+from tcr_hardware.errors import HardwareError
 from tcr_hardware.natnet.client import NatNetClient
 from tcr_hardware.natnet.marker_frame import MarkerFrame
 from tcr_hardware.natnet.settings import NatNetSettings
-
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.devices import Sighting
 from tcrctl.plant.rig_settings import Calibration, CameraSettings, MarkerSettings
 from tcrctl.robot.model import node_index, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import RawFrame
-
 
 #: How long a first frame is waited for, to find out whether the cameras know the markers [s].
 FIRST_FRAME_S = 1.0

@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 
 from tcrctl.plant.settings import Rings
 from tcrctl.robot.sections import Name, NodeName
-from tcrctl.settings import Settings, quantity, refuse
 from tcrctl.settings import Path as Keys
+from tcrctl.settings import Settings, quantity, refuse
 
 Port: TypeAlias = Annotated[int, Field(ge=1, le=65535)]
 Host: TypeAlias = Annotated[str, Field(min_length=1, description="host name or address")]
