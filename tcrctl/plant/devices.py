@@ -85,7 +85,7 @@ class DriveStatus:
         fault: Empty, or the latched fault.
         following_error: A drive does not keep up, as the PLC sees it.
         remote: The PLC listens to this program.
-        reject: Empty, or why the PLC did not take the last set-points.
+        reject: Empty, or why the PLC did not take the last set-points that it has looked at.
         acknowledged: The PLC has seen the last set-points; a lag of one exchange counts as seen.
         slack: The PLC finds a cable slack.
         round_trip: Time of the exchange [s].

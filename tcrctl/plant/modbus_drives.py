@@ -133,7 +133,7 @@ class ModbusDrives:
         """Read the status; over a serial line, where that costs wire time, what the last exchange said."""
         if self._last is not None and not self._asks:
             return self._last
-        return self._translated(self._call(self.bus.read_status), followed=False)
+        return self._translated(self._call(self.bus.read_status))
 
     def exchange(self, target: NDArray[np.int64], control: DriveControl) -> DriveStatus:
         """Send one block and get the status; axes without a cable stay where the PLC says they are."""
@@ -142,7 +142,7 @@ class ModbusDrives:
             block[axis] = int(value)
         bits = _bits(control)
         answer = self._call(lambda: self.bus.exchange(block, bits, self._speed))
-        self._last = self._translated(answer, followed=control.follow)
+        self._last = self._translated(answer)
         return self._last
 
     def close(self) -> None:
@@ -159,9 +159,9 @@ class ModbusDrives:
         except HardwareError as error:
             raise DeviceError(f"{self._where}: {error}", hint=error.hint) from error
 
-    def _translated(self, answer: Any, *, followed: bool) -> DriveStatus:
+    def _translated(self, answer: Any) -> DriveStatus:
         self._raw = list(answer.positions_um)
-        bits, refused = answer.status, followed and answer.reject is not Reject.NONE
+        bits, refused = answer.status, answer.reject is not Reject.NONE
         return DriveStatus(
             position=self._signs * np.array(answer.positions_um, dtype=np.int64)[self._axes],
             enabled=Status.ENABLED in bits,

@@ -23,7 +23,7 @@ from tcrctl.plant.devices import Cameras, DriveControl, Drives, DriveStatus, Sig
 from tcrctl.plant.session import Session
 from tcrctl.plant.set_points import Clamp, DriveEnvelope, Micrometres, SetPoints
 from tcrctl.plant.supervisor import Rules, Sight, State, Supervisor
-from tcrctl.signals import Command, Measurement, Truth
+from tcrctl.signals import Array, Command, Measurement, Truth
 
 #: How often the drives are written to while they are armed or stopped outside the control loop [s].
 CYCLE: Final = 0.02
@@ -100,9 +100,9 @@ class RigPlant:
             RigStopError: If the supervisor ends the run.
             DeviceError: If a device is lost.
         """
-        self._ask(self._drives.status)
-        sighting = self._cameras.next(PATIENCE / self._cameras.rate)
-        measured = self._measurement(sighting)
+        if self._ask(self._drives.status):
+            self._count_refusals()
+        measured = self._measurement(self._cameras.next(PATIENCE / self._cameras.rate))
         self._supervise()
         return measured
 
@@ -123,10 +123,13 @@ class RigPlant:
         moving = self.supervisor.state is State.RUNNING
         target, clamps = points.propose(command.speed if moving else np.zeros_like(command.speed))
         self._note_clamps(clamps)
-        taken = self._exchange(target, self.supervisor.control)
-        points.accept() if taken else points.reject()
+        if self._exchange(target, self.supervisor.control):
+            points.accept()
+        else:
+            points.start_again()
         self._supervise()
-        return Command(1e-6 * (points.accepted - before) / self._period, 1e-6 * points.accepted)
+        change = 1e-6 * (points.accepted - before) / self._period
+        return Command(np.asarray(change, float), np.asarray(1e-6 * points.accepted, float))
 
     def truth(self) -> Truth | None:
         """A rig does not know more than it measures."""
@@ -226,16 +229,21 @@ class RigPlant:
         return True
 
     def _exchange(self, target: Micrometres, control: DriveControl) -> bool:
-        """Whether the drives took the set-points."""
-        if not self._ask(lambda: self._drives.exchange(target, control)):
-            return False
-        refused = bool(control.follow and self._status is not None and self._status.reject)
-        self._rejects = self._rejects + 1 if refused else 0
-        return not refused
+        """Whether the drives answered; a PLC answers before it looks at the set-points."""
+        return self._ask(lambda: self._drives.exchange(target, control))
+
+    def _count_refusals(self) -> None:
+        """Take back set-points that the PLC has refused since the last write."""
+        points, status = self._points, self._status
+        if points is None or status is None or not self.supervisor.control.follow:
+            return
+        if status.reject:
+            points.take_back()
+        self._rejects = self._rejects + 1 if status.reject else 0
 
     def _measurement(self, sighting: Sighting | None) -> Measurement:
         now, run_time = self._clock(), self._session.time()
-        drive = np.zeros(0) if self._status is None else 1e-6 * self._status.position
+        drive = np.zeros(0) if self._status is None else np.asarray(1e-6 * self._status.position, float)
         if sighting is None:
             return self._blind(run_time, drive)
         self._seen = sighting
@@ -244,7 +252,7 @@ class RigPlant:
         taken = run_time - (now - sighting.taken)
         return Measurement(taken, sighting.nodes, sighting.valid, drive, sighting.raw)
 
-    def _blind(self, t: float, drive: np.ndarray) -> Measurement:
+    def _blind(self, t: float, drive: Array) -> Measurement:
         """What is known if no frame came: where the markers were last, none of them valid."""
         seen = self._seen
         nodes = np.zeros((self._limits.nodes, 3), np.float32) if seen is None else seen.nodes

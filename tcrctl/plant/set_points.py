@@ -87,7 +87,7 @@ class SetPoints:
     """Integrates the speeds of one armed period.
 
     Attributes:
-        accepted: Last set-points that the drives took (m,) [um].
+        accepted: Last set-points that the drives got and did not refuse (m,) [um].
     """
 
     def __init__(self, envelope: DriveEnvelope, period: float, start: Sequence[int]) -> None:
@@ -100,7 +100,7 @@ class SetPoints:
         """
         self._envelope, self._period = envelope, period
         self.accepted: Micrometres = np.array(start, dtype=np.int64)
-        self._exact = self.accepted.astype(float)
+        self._before, self._exact = self.accepted, self.accepted.astype(float)
         self._speed = np.zeros(self.accepted.shape[0])
         self._next, self._next_exact, self._next_speed = self.accepted, self._exact, self._speed
 
@@ -120,12 +120,18 @@ class SetPoints:
         return whole, tuple(clamps)
 
     def accept(self) -> None:
-        """The drives took what was proposed last."""
+        """The drives have got what was proposed last."""
+        self._before = self.accepted
         self.accepted, self._exact, self._speed = self._next, self._next_exact, self._next_speed
 
-    def reject(self) -> None:
-        """The drives did not; the next proposal starts at what they took before, from standstill."""
+    def start_again(self) -> None:
+        """The drives have not got it: the next proposal starts at what they got before, from standstill."""
         self._exact, self._speed = self.accepted.astype(float), np.zeros_like(self._speed)
+
+    def take_back(self) -> None:
+        """The drives have refused what they got last: the one before is still in force."""
+        self.accepted = self._before
+        self.start_again()
 
     def _allowed_speed(self, wanted: Array, clamps: list[Clamp]) -> Array:
         e, change = self._envelope, self._envelope.acceleration * self._period
