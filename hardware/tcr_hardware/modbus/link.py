@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import select
 import socket
 import struct
 import time
@@ -31,6 +32,7 @@ from tcr_hardware.modbus.settings import RtuLink, TcpLink
 READ, WRITE, READ_WRITE = 3, 16, 23
 #: Pause after an answer that was not the one asked for [s].
 SETTLE_S = 0.005
+LONGEST_FRAME = 256
 #: What the parser of pymodbus can raise on bytes that are no Modbus answer.
 PARSER_ERRORS = (ModbusException, ValueError, IndexError, KeyError, TypeError, struct.error)
 
@@ -187,11 +189,26 @@ class ModbusLink:
         return answer
 
 
+class PromptSerialClient(ModbusSerialClient):
+    """Serial client that wakes up when bytes come, where the one of pymodbus looks every millisecond or more."""
+
+    def recv(self, size: int | None) -> bytes:
+        """Bytes that have come within the time-out; none if none came."""
+        line, timeout_s = self.socket, self.comm_params.timeout_connect
+        if line is None:
+            raise ConnectionException(str(self))
+        if not select.select([line.fileno()], [], [], timeout_s)[0]:
+            return b""
+        if not (data := os.read(line.fileno(), size or LONGEST_FRAME)):
+            raise ConnectionException(f"{self}: the device is gone")
+        return data
+
+
 def _client(link: TcpLink | RtuLink, timeout_s: float) -> ModbusTcpClient | ModbusSerialClient:
     """Client of pymodbus that neither retries nor waits longer than one answer may take."""
     if isinstance(link, TcpLink):
         return ModbusTcpClient(link.host, port=link.port, timeout=timeout_s, retries=0)
-    return ModbusSerialClient(
+    return PromptSerialClient(
         link.device,
         baudrate=link.baud,
         parity=link.parity,

@@ -1,0 +1,167 @@
+"""NatNet as a server writes it, versions 2.5 to 4.3 [NN24]: struct codes, nothing shared with the client."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcr_hardware.emulators.motive_scene import MARKER_SIZE, RESIDUAL, BodyPose, Labelled, Scene, View
+
+Version = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """Number, clocks and flags of one frame.
+
+    Attributes:
+        number: Frame number.
+        timestamp: Time since the stream began [s].
+        mid_exposure: Server clock [ticks].
+        received: Server clock [ticks].
+        transmit: Server clock [ticks].
+        latency: From the arrival of the camera data to sending [s].
+        params: Flags.
+    """
+
+    number: int
+    timestamp: float
+    mid_exposure: int
+    received: int
+    transmit: int
+    latency: float
+    params: int
+
+
+def packet(message: int, payload: bytes = b"") -> bytes:
+    """Put the header before a payload."""
+    return struct.pack("<HH", message, len(payload)) + payload
+
+
+def text(value: str) -> bytes:
+    """A name with its closing zero."""
+    return value.encode() + b"\0"
+
+
+def sender(name: str, version: Version) -> bytes:
+    """Who we are; behind the name lies garbage, as in the real thing."""
+    return text(name).ljust(256, b"\xcd") + bytes((3, 1, 0, 0)) + bytes((*version, 0, 0))
+
+
+def server_info(
+    name: str, version: Version, clock_hz: int, data_port: int, multicast: bool, group: str
+) -> bytes:
+    """Payload of SERVERINFO."""
+    if version < (3, 0):
+        return sender(name, version)
+    address = bytes(int(part) for part in group.split("."))
+    return sender(name, version) + struct.pack("<QHB", clock_hz, data_port, multicast) + address
+
+
+def _section(version: Version, bodies: Iterable[bytes]) -> bytes:
+    """Count, from 4.1 size, and elements."""
+    elements = list(bodies)
+    content = b"".join(elements)
+    if version >= (4, 1):
+        return struct.pack("<ii", len(elements), len(content)) + content
+    return struct.pack("<i", len(elements)) + content
+
+
+def _points(positions: NDArray[np.float64]) -> bytes:
+    return positions.astype("<f4").tobytes()
+
+
+def _body(version: Version, body: BodyPose) -> bytes:
+    out = struct.pack("<i3f4f", body.id, *body.position, *body.orientation)
+    if version < (3, 0):
+        n = len(body.markers)
+        ids, sizes = range(1, n + 1), [MARKER_SIZE] * n
+        out += struct.pack("<i", n) + _points(body.markers) + struct.pack(f"<{n}i{n}f", *ids, *sizes)
+    out += struct.pack("<f", RESIDUAL)
+    return out + struct.pack("<h", body.tracked) if version >= (2, 6) else out
+
+
+def _labelled(version: Version, marker: Labelled) -> bytes:
+    out = struct.pack("<i3ff", marker.id, *marker.position, MARKER_SIZE)
+    if version >= (2, 6):
+        out += struct.pack("<h", marker.params)
+    return out + struct.pack("<f", RESIDUAL) if version >= (3, 0) else out
+
+
+def _suffix(version: Version, stamp: Stamp) -> bytes:
+    out = struct.pack("<f", stamp.latency) if version < (3, 0) else b""
+    out += struct.pack("<II", 0, 0)  # time code
+    if version >= (2, 7):
+        out += struct.pack("<d", stamp.timestamp)
+    elif version >= (2, 6):
+        out += struct.pack("<f", stamp.timestamp)
+    if version >= (3, 0):
+        out += struct.pack("<QQQ", stamp.mid_exposure, stamp.received, stamp.transmit)
+    if version >= (4, 1):
+        out += struct.pack("<II", 0, 0)  # no PTP clock
+    if version >= (2, 6):
+        out += struct.pack("<h", stamp.params)
+    return out + struct.pack("<i", 0)
+
+
+def frame(version: Version, stamp: Stamp, view: View) -> bytes:
+    """Payload of FRAMEOFDATA."""
+    sets = (text(name) + struct.pack("<i", len(points)) + _points(points) for name, points in view.sets)
+    labelled = view.labelled
+    if version < (3, 0):
+        labelled = tuple(marker for marker in labelled if not marker.params & 0x10)
+    out = [
+        struct.pack("<i", stamp.number),
+        _section(version, sets),
+        _section(version, (_points(point) for point in view.unlabelled)),
+        _section(version, (_body(version, body) for body in view.bodies)),
+        _section(version, ()),  # skeletons
+    ]
+    if version >= (4, 1):
+        out.append(_section(version, ()))  # assets
+    out.append(_section(version, (_labelled(version, marker) for marker in labelled)))
+    if version >= (2, 9):
+        out.append(_section(version, ()))  # force plates
+    if version >= (2, 11):
+        out.append(_section(version, ()))  # devices
+    return b"".join([*out, _suffix(version, stamp)])
+
+
+def models(version: Version, scene: Scene) -> bytes:
+    """Payload of MODELDEF: a marker set and a rigid body for every body, the set of all, one camera from 3.0 on."""
+    out = []
+    for body in scene.bodies:
+        out.append((0, _set_description(body.name, body.markers)))
+        offsets = scene.rest[list(body.rows)] - scene.rest[list(body.rows)].mean(axis=0)
+        out.append((1, _body_description(version, body.name, body.id, body.markers, offsets)))
+    out.append((0, _set_description("all", scene.names)))
+    if version >= (3, 0):
+        out.append((5, text("Camera #1") + struct.pack("<3f4f", 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)))
+    described = []
+    for kind, description in out:
+        size = struct.pack("<i", len(description)) if version >= (4, 1) else b""
+        described.append(struct.pack("<i", kind) + size + description)
+    return struct.pack("<i", len(described)) + b"".join(described)
+
+
+def _set_description(name: str, markers: Iterable[str]) -> bytes:
+    names = [text(marker) for marker in markers]
+    return text(name) + struct.pack("<i", len(names)) + b"".join(names)
+
+
+def _body_description(
+    version: Version, name: str, number: int, markers: tuple[str, ...], offsets: NDArray[np.float64]
+) -> bytes:
+    out = text(name) + struct.pack("<ii3f", number, -1, 0.0, 0.0, 0.0)
+    if version >= (4, 2):
+        out += struct.pack("<4f", 0.0, 0.0, 0.0, 1.0)
+    if version >= (3, 0):
+        n = len(markers)
+        out += struct.pack("<i", n) + _points(offsets) + struct.pack(f"<{n}i", *[0] * n)
+    if version >= (4, 0):
+        out += b"".join(text(marker) for marker in markers)
+    return out

@@ -1,0 +1,292 @@
+"""The program of the PLC, one scan at a time: the same rules as ``hardware/plc/tcr_plc.st``, in the same order.
+
+                        ENABLE edge, READY                      FOLLOW
+            disabled ------------------------> enabled, hold <----------> following
+               ^   ^                                |                         |
+               |   |  standstill                    +----------+--------------+
+               |   +----------- stopping <---------------------+   RUN or ENABLE off
+               |  RESET edge       |                           |
+            fault latched <--------+ <-------------------------+   watchdog, e-stop, following error, drive
+
+The drives hold their position in every state: letting go of the cables would drop the robot. Nothing starts
+again by itself: after a stop a new ENABLE edge is needed, after a fault a RESET edge before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from tcr_hardware.emulators.servo import Servo, ServoSettings
+from tcr_hardware.modbus.registers import Control, Fault, Reject, Status
+
+#: Set-points are spread over the time between the last two sets, within these bounds [s].
+SHORTEST_INTERVAL_S, LONGEST_INTERVAL_S = 0.002, 0.1
+#: A drive within this distance of its set-point is in position [um].
+IN_POSITION_UM = 50.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlcLimitSettings:
+    """What the program enforces by itself.
+
+    Attributes:
+        min_um: Lower end of every stroke [um].
+        max_um: Upper end of every stroke [um].
+        vmax_um_s: Largest speed of the set-points [um/s].
+        step_max_um: Largest change of a set-point from one set to the next [um].
+        watchdog_ms: Silence after which it stops [ms].
+        deceleration_um_s2: Deceleration of a stop [um/s2].
+        following_um: Following error that is a fault [um].
+    """
+
+    min_um: int = -60_000
+    max_um: int = 60_000
+    vmax_um_s: int = 100_000
+    step_max_um: int = 6_000
+    watchdog_ms: int = 200
+    deceleration_um_s2: int = 2_000_000
+    following_um: int = 8_000
+
+
+@dataclass(frozen=True, slots=True)
+class PlcCommand:
+    """What the program finds in its command registers at the start of a scan.
+
+    Attributes:
+        control: Control bits.
+        heartbeat: HEARTBEAT.
+        setpoints: SP (axes,) [um].
+        vmax: VMAX [um/s].
+        seq: SEQ.
+    """
+
+    control: Control
+    heartbeat: int
+    setpoints: tuple[float, ...]
+    vmax: float
+    seq: int
+
+
+class PlcProgram:
+    """State of the PLC and its drives between two scans.
+
+    Attributes:
+        servos: The drives.
+        estop: The e-stop button is pressed.
+        drive_lost: The field bus to the drives is down.
+        cycle: Scan counter.
+        fault: Latched fault.
+        enabled: Operation is enabled.
+        stopping: The set-points are being brought to rest.
+        zeroed: The zero of the positions is known.
+        seq_ack: SEQ accepted last.
+        heartbeat_echo: HEARTBEAT seen last.
+        reject: Why the last set was refused, and the axis from 1.
+        active: Set-points that the drives follow (axes,) [um].
+    """
+
+    def __init__(self, axes: int, limits: PlcLimitSettings, servo: ServoSettings, *, zeroed: bool) -> None:
+        """Power up with all drives at rest at 0."""
+        self._limits = limits
+        self.servos = [Servo(servo) for _ in range(axes)]
+        self.estop = self.drive_lost = False
+        self._origin = [0.0] * axes
+        self.power_up()
+        self.zeroed = zeroed
+
+    def power_up(self) -> None:
+        """Start anew, where the drives stand; absolute encoders keep the zero."""
+        self.cycle = self.seq_ack = self.heartbeat_echo = 0
+        self._seq_seen, self._silence_s, self._since_set_s = 0, 0.0, LONGEST_INTERVAL_S
+        self._control = Control(0)
+        self.fault, self.watchdog, self.following_error = Fault.NONE, False, False
+        self.enabled = self.stopping = self._following = self.limited = False
+        self.reject = (Reject.NONE, 0)
+        self.active = self.positions()
+        self._target, self._speed, self._time_left_s = list(self.active), [0.0] * len(self.servos), 0.0
+
+    def positions(self) -> list[float]:
+        """Positions reported (axes,), since tension zero [um]."""
+        return [servo.position - origin for servo, origin in zip(self.servos, self._origin, strict=True)]
+
+    def status(self) -> Status:
+        """Status bits."""
+        at_rest = all(
+            abs(active - at) <= IN_POSITION_UM
+            for active, at in zip(self.active, self.positions(), strict=True)
+        )
+        bits = (
+            (Status.READY, self._ready()),
+            (Status.ZEROED, self.zeroed),
+            (Status.ENABLED, self.enabled),
+            (Status.FAULT, self.fault is not Fault.NONE),
+            (Status.ESTOP, self.estop),
+            (Status.STOPPING, self.stopping),
+            (Status.FOLLOWING_ERROR, self.following_error),
+            (Status.LIMITED, self.limited),
+            (Status.WATCHDOG, self.watchdog),
+            (Status.REMOTE, True),
+            (Status.IN_POSITION, at_rest and not self._moving()),
+            (Status.DRIVE_COMM, self.drive_lost),
+        )
+        return Status(sum(bit for bit, is_set in bits if is_set))
+
+    def scan(self, command: PlcCommand, dt: float) -> None:
+        """One cycle of the program, ``dt`` [s] after the last."""
+        self.cycle = (self.cycle + 1) & 0xFFFF
+        rising = command.control & ~self._control
+        self._control = command.control
+        self._watch(command, dt)
+        self._find_faults()
+        if Control.RESET in rising:
+            self._reset()
+        if Control.ZERO in rising:
+            self._zero()
+        self._permit(command, rising)
+        self._take(command, dt)
+        self._move(command, dt)
+        self.coast(dt)
+
+    def coast(self, dt: float) -> None:
+        """Time passes for the drives alone: they follow their last set-points, also while the program hangs."""
+        for servo, active, origin in zip(self.servos, self.active, self._origin, strict=True):
+            servo.step(active + origin, dt)
+
+    def _watch(self, command: PlcCommand, dt: float) -> None:
+        """Watchdog: the host has to change HEARTBEAT while operation is enabled."""
+        alive = command.heartbeat != self.heartbeat_echo
+        self.heartbeat_echo = command.heartbeat
+        self._silence_s = 0.0 if alive else self._silence_s + dt
+        if self.enabled and 1e3 * self._silence_s >= self._limits.watchdog_ms:
+            self.watchdog = True
+            self._trip(Fault.WATCHDOG)
+
+    def _find_faults(self) -> None:
+        """Faults of the machine itself."""
+        if self.estop:
+            self._trip(Fault.ESTOP)
+        if self.drive_lost:
+            self._trip(Fault.DRIVE)
+        for axis, at in enumerate(self.positions()):
+            if abs(self.active[axis] - at) > self._limits.following_um:
+                self.following_error = True
+                self.active[axis], self._speed[axis] = at, 0.0  # no jump when the axis comes free
+                self._trip(Fault.FOLLOWING_ERROR)
+
+    def _trip(self, fault: Fault) -> None:
+        """Latch a fault and stop; the first fault stays the one reported."""
+        if self.fault is Fault.NONE:
+            self.fault = fault
+        self._stop()
+
+    def _stop(self) -> None:
+        """Bring the set-points to rest; they stay there."""
+        self.enabled = self._following = False
+        self.stopping = self.stopping or self._moving()
+
+    def _reset(self) -> None:
+        """Acknowledge a fault, once its cause is gone and everything stands."""
+        if not (self.estop or self.drive_lost or self._moving()):
+            self.fault, self.watchdog, self.following_error = Fault.NONE, False, False
+
+    def _zero(self) -> None:
+        """Take the present positions as zero."""
+        if self._following or self._moving():
+            return
+        self._origin = [servo.position for servo in self.servos]
+        self.active = [0.0] * len(self.servos)
+        self._target, self.zeroed = list(self.active), True
+
+    def _ready(self) -> bool:
+        """Whether an ENABLE edge would be obeyed, given RUN."""
+        return self.fault is Fault.NONE and self.zeroed and not self.stopping
+
+    def _permit(self, command: PlcCommand, rising: Control) -> None:
+        """Enable on the edge, bumpless; stop without ENABLE or RUN."""
+        wanted = Control.ENABLE in command.control and Control.RUN in command.control
+        if self.enabled and not wanted:
+            self._stop()
+        elif Control.ENABLE in rising and wanted and self._ready():
+            self.enabled = True
+            self._silence_s = 0.0
+            self.active = self.positions()
+            self._target, self._speed = list(self.active), [0.0] * len(self.servos)
+        self._following = self.enabled and Control.FOLLOW in command.control
+
+    def _take(self, command: PlcCommand, dt: float) -> None:
+        """Take the set-points together when SEQ changes, or none of them."""
+        self._since_set_s = min(self._since_set_s + dt, LONGEST_INTERVAL_S)
+        if command.seq == self._seq_seen:
+            return
+        self._seq_seen = command.seq
+        self.reject = self._verdict(command)
+        if self.reject[0] is not Reject.NONE:
+            return
+        self.seq_ack = command.seq
+        if self._following:
+            self._target = list(command.setpoints)
+            self._time_left_s = max(self._since_set_s, SHORTEST_INTERVAL_S)
+        self._since_set_s = 0.0
+
+    def _verdict(self, command: PlcCommand) -> tuple[Reject, int]:
+        """Whether a set may be taken; without FOLLOW its set-points do not matter."""
+        if Control.FOLLOW not in command.control:
+            return Reject.NONE, 0
+        if self.estop:
+            return Reject.ESTOP, 0
+        if not self.enabled:
+            return Reject.NOT_ENABLED, 0
+        limits = self._limits
+        for axis, (wanted, last) in enumerate(zip(command.setpoints, self._target, strict=True), start=1):
+            if not limits.min_um <= wanted <= limits.max_um:
+                return Reject.RANGE, axis
+            if abs(wanted - last) > limits.step_max_um:
+                return Reject.STEP, axis
+        if not 0 < command.vmax <= limits.vmax_um_s:
+            return Reject.SPEED, 0
+        return Reject.NONE, 0
+
+    def _move(self, command: PlcCommand, dt: float) -> None:
+        """Let the set-points of the drives advance by one scan."""
+        if not self._following:
+            self._brake(dt)
+            return
+        cap = min(command.vmax, self._limits.vmax_um_s) * dt
+        share = min(dt / self._time_left_s, 1.0) if self._time_left_s > 0.0 else 1.0
+        self._time_left_s = max(self._time_left_s - dt, 0.0)
+        self.limited = False
+        for axis, target in enumerate(self._target):
+            wanted = (target - self.active[axis]) * share
+            step = min(max(wanted, -cap), cap)
+            self.limited = self.limited or step != wanted
+            self.active[axis] += step
+            self._speed[axis] = step / dt
+
+    def _brake(self, dt: float) -> None:
+        """Slow down to rest, within the strokes."""
+        change, limits = self._limits.deceleration_um_s2 * dt, self._limits
+        for axis, speed in enumerate(self._speed):
+            if speed:
+                slower = max(abs(speed) - change, 0.0) * (1.0 if speed > 0.0 else -1.0)
+                ahead = self.active[axis] + slower * dt
+                self.active[axis] = min(max(ahead, limits.min_um), limits.max_um)
+                self._speed[axis] = slower if self.active[axis] == ahead else 0.0
+        self._target = list(self.active)
+        self.limited = False
+        self.stopping = self.stopping and self._moving()
+
+    def _moving(self) -> bool:
+        """Whether a set-point of the drives moves."""
+        return any(self._speed)
+
+
+def command_of(values: Mapping[str, Sequence[float]]) -> PlcCommand:
+    """Command from the values of the command registers by name."""
+    return PlcCommand(
+        Control(int(values["CTRL"][0]) & sum(Control)),
+        int(values["HEARTBEAT"][0]),
+        tuple(values["SP"]),
+        values["VMAX"][0],
+        int(values["SEQ"][0]),
+    )
