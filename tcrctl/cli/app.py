@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from tcrctl import __version__
+from tcrctl.cli.emulate import emulate
 from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
@@ -33,6 +34,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "info": info,
     "recover": recover,
     "export": export,
+    "emulate": emulate,
 }
 
 
