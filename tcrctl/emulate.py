@@ -19,12 +19,12 @@ from typing import Any, Final, Self
 
 import numpy as np
 from tcr_hardware.calibration import RigidTransform
+
 from tcr_hardware.emulators.motive import MotiveEmulator
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.errors import HardwareError
-
 from tcrctl.emulated_robot import EmulatedRobot
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.fault_script import FaultScript, Player
@@ -73,7 +73,9 @@ class EmulatedBench:
         robots: The simulated robots.
     """
 
-    def __init__(self, rig: RigFile, settings: EmulationSettings, robots: dict[str, Robot] | None = None) -> None:
+    def __init__(
+        self, rig: RigFile, settings: EmulationSettings, robots: dict[str, Robot] | None = None
+    ) -> None:
         """Build everything; nothing is opened yet.
 
         Args:
@@ -141,7 +143,9 @@ class EmulatedBench:
             self._opened.callback(self.motive.stop)
         except (HardwareError, OSError) as error:
             self._opened.close()
-            raise DeviceError(f"the bench cannot be emulated: {error}", hint=getattr(error, "hint", "")) from error
+            raise DeviceError(
+                f"the bench cannot be emulated: {error}", hint=getattr(error, "hint", "")
+            ) from error
         return self
 
     def __exit__(
@@ -204,7 +208,9 @@ def emulate(
 def _address(mounted: MountedRobot) -> tuple[str, int]:
     plc = mounted.plc
     if not isinstance(plc, ModbusTcp):
-        raise InputError("only PLCs on Modbus TCP are emulated from a rig file", hint="Use plc.kind: modbus_tcp.")
+        raise InputError(
+            "only PLCs on Modbus TCP are emulated from a rig file", hint="Use plc.kind: modbus_tcp."
+        )
     return plc.host, plc.port
 
 

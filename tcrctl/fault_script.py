@@ -1,9 +1,9 @@
 """What shall go wrong with an emulated bench, and when: a YAML file, checked before anything starts.
 
-    faults:
-      - {at_s: 2, after: moving, cameras: {loss: 0.1}, for_s: 5}
-      - {at_s: 8, after: moving, plc: estop, for_s: 1}
-      - {at_s: 12, plc: exception, with: {code: 4}, robot: tcr700}
+faults:
+  - {at_s: 2, after: moving, cameras: {loss: 0.1}, for_s: 5}
+  - {at_s: 8, after: moving, plc: estop, for_s: 1}
+  - {at_s: 12, plc: exception, with: {code: 4}, robot: tcr700}
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
+
 from tcr_hardware.emulators.motive import MotiveEmulator
 from tcr_hardware.emulators.motive_faults import MotiveFaults
 from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.emulators.plc_faults import FAULTS
 from tcr_hardware.modbus.registers import Status
-
 from tcrctl import strict_yaml
 from tcrctl.settings import Path as Keys
 from tcrctl.settings import Settings, quantity, refuse
@@ -94,9 +94,18 @@ def camera_value(name: str, value: Any) -> Any:
         return tuple((str(a), str(b)) for a, b in value)
     if name == "offset_m" and isinstance(value, list) and len(value) == 3:
         return tuple(float(item) for item in value)
-    if kind in (bool, int, float) and type(value) in (kind, int) and not (kind is bool and type(value) is int):
+    if (
+        kind in (bool, int, float)
+        and type(value) in (kind, int)
+        and not (kind is bool and type(value) is int)
+    ):
         return kind(value)
-    names = {frozenset: "a list of marker names", bool: "true or false", int: "a whole number", float: "a number"}
+    names = {
+        frozenset: "a list of marker names",
+        bool: "true or false",
+        int: "a whole number",
+        float: "a number",
+    }
     special = {"swap": "a list of pairs of marker names", "offset_m": "three numbers"}
     raise ValueError(f"must be {special.get(name) or names[kind]}, not {value!r}")
 

@@ -14,7 +14,9 @@ from tcrctl.cli.options import AsJson
 
 
 def emulate(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="Shipped rig, or path of a rig file.")] = "loopback",
+    rig: Annotated[
+        str, typer.Argument(metavar="RIG", help="Shipped rig, or path of a rig file.")
+    ] = "loopback",
     faults: Annotated[
         Path | None, typer.Option("--faults", metavar="FILE", help="YAML file of what goes wrong, and when.")
     ] = None,

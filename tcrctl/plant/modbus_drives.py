@@ -8,6 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tcr_hardware.errors import HardwareError
 from tcr_hardware.modbus.bus import PlcBus
 from tcr_hardware.modbus.errors import (
     ImplausibleAnswerError,
@@ -18,8 +20,6 @@ from tcr_hardware.modbus.errors import (
 )
 from tcr_hardware.modbus.registers import Control, Fault, Reject, Status, register_map
 from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
-
-from tcr_hardware.errors import HardwareError
 from tcrctl.errors import DeviceError, InputError, UntrustworthyDeviceError
 from tcrctl.plant.devices import DriveControl, DriveStatus
 from tcrctl.plant.rig_settings import CableDrive, ModbusTcp, MountedRobot, SafetyRules

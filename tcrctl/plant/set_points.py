@@ -111,7 +111,9 @@ class SetPoints:
             speed: Wanted speeds (m,) [m/s].
         """
         clamps: list[Clamp] = []
-        moving = self._allowed_speed(1e6 * np.asarray(speed, dtype=float), clamps)
+        with np.errstate(over="ignore"):  # infinite is refused below
+            wanted = 1e6 * np.asarray(speed, dtype=float)
+        moving = self._allowed_speed(wanted, clamps)
         exact = self._exact + self._period * moving
         whole = self._allowed_positions(np.rint(exact).astype(np.int64), clamps)
         free = np.abs(whole - exact) <= 0.5
