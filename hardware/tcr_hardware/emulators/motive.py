@@ -158,7 +158,7 @@ class MotiveEmulator:
     def latest(self, version: Version) -> bytes:
         """The scene now, as one FRAMEOFDATA packet."""
         stamp, view = self._look(time.monotonic())
-        return encoder.packet(FRAMEOFDATA, encoder.frame(version, stamp, view))
+        return encoder.packet(FRAMEOFDATA, encoder.frame(version, stamp, self.scene, view))
 
     def _look(self, now: float) -> tuple[Stamp, View]:
         sent = now + self.settings.latency_s
@@ -203,7 +203,7 @@ class MotiveEmulator:
             stamp.number, stamp.timestamp, stamp.mid_exposure, stamp.received, stamp.transmit, stamp.latency,
             stamp.params | flags,
         )  # fmt: skip
-        return encoder.packet(FRAMEOFDATA, encoder.frame(version, flagged, view))
+        return encoder.packet(FRAMEOFDATA, encoder.frame(version, flagged, self.scene, view))
 
     def _bitstream(self, listener: Client) -> int:
         if listener.flagged <= 0:

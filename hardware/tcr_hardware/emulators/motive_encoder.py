@@ -9,9 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tcr_hardware.emulators.motive_scene import MARKER_SIZE, RESIDUAL, BodyPose, Labelled, Scene, View
+from tcr_hardware.emulators.motive_scene import UNLABELLED, Scene, View
 
 Version = tuple[int, int]
+
+MARKER_SIZE = 0.008
+RESIDUAL = 0.0003
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,34 +65,54 @@ def server_info(
     return sender(name, version) + struct.pack("<QHB", clock_hz, data_port, multicast) + address
 
 
-def _section(version: Version, bodies: Iterable[bytes]) -> bytes:
+def _section(version: Version, count: int, content: bytes = b"") -> bytes:
     """Count, from 4.1 size, and elements."""
-    elements = list(bodies)
-    content = b"".join(elements)
     if version >= (4, 1):
-        return struct.pack("<ii", len(elements), len(content)) + content
-    return struct.pack("<i", len(elements)) + content
+        return struct.pack("<ii", count, len(content)) + content
+    return struct.pack("<i", count) + content
 
 
 def _points(positions: NDArray[np.float64]) -> bytes:
     return positions.astype("<f4").tobytes()
 
 
-def _body(version: Version, body: BodyPose) -> bytes:
-    out = struct.pack("<i3f4f", body.id, *body.position, *body.orientation)
-    if version < (3, 0):
-        n = len(body.markers)
-        ids, sizes = range(1, n + 1), [MARKER_SIZE] * n
-        out += struct.pack("<i", n) + _points(body.markers) + struct.pack(f"<{n}i{n}f", *ids, *sizes)
-    out += struct.pack("<f", RESIDUAL)
-    return out + struct.pack("<h", body.tracked) if version >= (2, 6) else out
+def _sets(version: Version, scene: Scene, view: View) -> bytes:
+    sets = [(body.name, view.in_sets[body.rows]) for body in scene.bodies] + [("all", view.in_sets)]
+    out = [text(name) + struct.pack("<i", len(points)) + _points(points) for name, points in sets]
+    return _section(version, len(out), b"".join(out))
 
 
-def _labelled(version: Version, marker: Labelled) -> bytes:
-    out = struct.pack("<i3ff", marker.id, *marker.position, MARKER_SIZE)
-    if version >= (2, 6):
-        out += struct.pack("<h", marker.params)
-    return out + struct.pack("<f", RESIDUAL) if version >= (3, 0) else out
+def _bodies(version: Version, scene: Scene, view: View) -> bytes:
+    out = []
+    poses = zip(
+        view.body_positions.tolist(), view.body_orientations.tolist(), view.body_tracked.tolist(), strict=True
+    )
+    for body, (position, orientation, tracked) in zip(scene.bodies, poses, strict=True):
+        content = struct.pack("<i3f4f", body.id, *position, *orientation)
+        if version < (3, 0):
+            n = len(body.rows)
+            ids, sizes = range(1, n + 1), [MARKER_SIZE] * n
+            content += struct.pack("<i", n) + _points(view.in_sets[body.rows])
+            content += struct.pack(f"<{n}i{n}f", *ids, *sizes)
+        content += struct.pack("<f", RESIDUAL)
+        out.append(content + struct.pack("<h", tracked) if version >= (2, 6) else content)
+    return _section(version, len(out), b"".join(out))
+
+
+def _labelled(version: Version, view: View) -> bytes:
+    out = []
+    for number, position, params in zip(
+        view.ids.tolist(), view.positions.tolist(), view.params.tolist(), strict=True
+    ):
+        if version >= (3, 0):
+            out.append(struct.pack("<i3ffhf", number, *position, MARKER_SIZE, params, RESIDUAL))
+        elif params == UNLABELLED:
+            continue  # old servers list them as unlabelled only
+        elif version >= (2, 6):
+            out.append(struct.pack("<i3ffh", number, *position, MARKER_SIZE, params))
+        else:
+            out.append(struct.pack("<i3ff", number, *position, MARKER_SIZE))
+    return _section(version, len(out), b"".join(out))
 
 
 def _suffix(version: Version, stamp: Stamp) -> bytes:
@@ -108,26 +131,22 @@ def _suffix(version: Version, stamp: Stamp) -> bytes:
     return out + struct.pack("<i", 0)
 
 
-def frame(version: Version, stamp: Stamp, view: View) -> bytes:
+def frame(version: Version, stamp: Stamp, scene: Scene, view: View) -> bytes:
     """Payload of FRAMEOFDATA."""
-    sets = (text(name) + struct.pack("<i", len(points)) + _points(points) for name, points in view.sets)
-    labelled = view.labelled
-    if version < (3, 0):
-        labelled = tuple(marker for marker in labelled if not marker.params & 0x10)
     out = [
         struct.pack("<i", stamp.number),
-        _section(version, sets),
-        _section(version, (_points(point) for point in view.unlabelled)),
-        _section(version, (_body(version, body) for body in view.bodies)),
-        _section(version, ()),  # skeletons
+        _sets(version, scene, view),
+        _section(version, len(view.unlabelled), _points(view.unlabelled)),
+        _bodies(version, scene, view),
+        _section(version, 0),  # skeletons
     ]
     if version >= (4, 1):
-        out.append(_section(version, ()))  # assets
-    out.append(_section(version, (_labelled(version, marker) for marker in labelled)))
+        out.append(_section(version, 0))  # assets
+    out.append(_labelled(version, view))
     if version >= (2, 9):
-        out.append(_section(version, ()))  # force plates
+        out.append(_section(version, 0))  # force plates
     if version >= (2, 11):
-        out.append(_section(version, ()))  # devices
+        out.append(_section(version, 0))  # devices
     return b"".join([*out, _suffix(version, stamp)])
 
 
@@ -136,7 +155,7 @@ def models(version: Version, scene: Scene) -> bytes:
     out = []
     for body in scene.bodies:
         out.append((0, _set_description(body.name, body.markers)))
-        offsets = scene.rest[list(body.rows)] - scene.rest[list(body.rows)].mean(axis=0)
+        offsets = scene.rest[body.rows] - scene.rest[body.rows].mean(axis=0)
         out.append((1, _body_description(version, body.name, body.id, body.markers, offsets)))
     out.append((0, _set_description("all", scene.names)))
     if version >= (3, 0):

@@ -43,8 +43,11 @@ from tcr_hardware.natnet.protocol import NEWEST, Version
 from tcr_hardware.natnet.reader import Reader
 
 POINT = np.dtype(("<f4", 3))
+_ID, _SAMPLE = np.dtype("<i4"), np.dtype("<f4")
+_FLOAT = struct.Struct("<f")
 _BODY = struct.Struct("<i3f4f")
-_BODY_TAIL = {False: struct.Struct("<f"), True: struct.Struct("<fh")}
+_BODY_FLAGGED = struct.Struct("<fh")
+_BODY_PACKED = struct.Struct("<i3f4ffh")  # RIGID_BODY
 _MARKER_25 = np.dtype([("id", "<i4"), ("position", "<f4", 3), ("size", "<f4")])
 _MARKER_26 = np.dtype([*_MARKER_25.descr, ("params", "<i2")])
 _SUFFIX = (  # first version that has it, layout
@@ -175,15 +178,17 @@ def _rigid_bodies(reader: Reader, layout: Layout) -> Records:
 def _bodies_with_markers(reader: Reader, layout: Layout) -> tuple[Records, tuple[BodyMarkers, ...]]:
     """Rigid bodies before 3.0: each carries its markers."""
     count = reader.items("rigid bodies", _BODY.size + 8)
-    bodies, markers = records(RIGID_BODY, count), []
-    for body in bodies:
-        body_id, x, y, z, *orientation = reader.unpack(_BODY)
+    packed, markers, start = bytearray(count * RIGID_BODY.itemsize), [], 0
+    for _ in range(count):
+        head = reader.unpack(_BODY)
         n = reader.count("markers of a body", POINT.itemsize + 8)
-        markers.append(BodyMarkers(reader.array(POINT, n), reader.array("<i4", n), reader.array("<f4", n)))
-        tail = reader.unpack(_BODY_TAIL[layout.body_flags])
-        body["id"], body["position"], body["orientation"] = body_id, (x, y, z), orientation
-        body["mean_error"], body["params"] = tail[0], tail[1] if layout.body_flags else 0
-    return bodies, tuple(markers)
+        markers.append(BodyMarkers(reader.array(POINT, n), reader.array(_ID, n), reader.array(_SAMPLE, n)))
+        mean_error, params = (
+            reader.unpack(_BODY_FLAGGED) if layout.body_flags else (*reader.unpack(_FLOAT), 0)
+        )
+        _BODY_PACKED.pack_into(packed, start, *head, mean_error, params)
+        start += _BODY_PACKED.size
+    return np.frombuffer(bytes(packed), RIGID_BODY), tuple(markers)
 
 
 def _skeleton(reader: Reader, layout: Layout) -> Skeleton:
@@ -197,12 +202,12 @@ def _asset(reader: Reader, layout: Layout) -> Asset:
 
 def _analog(reader: Reader, layout: Layout) -> Analog:
     analog_id, n = reader.integer(), reader.items("channels", 4)
-    return Analog(analog_id, tuple([reader.array("<f4", reader.count("samples", 4)) for _ in range(n)]))
+    return Analog(analog_id, tuple([reader.array(_SAMPLE, reader.count("samples", 4)) for _ in range(n)]))
 
 
 def _widened(markers: Records) -> Records:
     """Labelled markers of any version as ``MARKER``; what the version lacks is 0."""
-    if markers.dtype is MARKER or markers.dtype == MARKER:
+    if markers.dtype is MARKER:
         return markers
     wide = records(MARKER, len(markers))
     for name in markers.dtype.names or ():

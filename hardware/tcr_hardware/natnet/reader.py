@@ -6,7 +6,7 @@ import struct
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from tcr_hardware.natnet.errors import MalformedPacketError
 
@@ -46,7 +46,11 @@ class Reader:
         Raises:
             MalformedPacketError: The payload ends.
         """
-        return int(self.unpack(_INTEGER)[0])
+        start, self.offset = self.offset, self.offset + 4
+        if self.offset > self.end:
+            raise self.fail("payload ends inside a number")
+        value: int = _INTEGER.unpack_from(self.buffer, start)[0]
+        return value
 
     def unpack(self, layout: struct.Struct) -> tuple[Any, ...]:
         """Read a fixed group of numbers.
@@ -94,20 +98,20 @@ class Reader:
         start, self.offset = self.offset, stop + 1
         return self.buffer[start:stop].decode("utf-8", "replace")
 
-    def array(self, dtype: DTypeLike, count: int, stride: int | None = None) -> NDArray[Any]:
+    def array(self, dtype: np.dtype[Any], count: int, stride: int | None = None) -> NDArray[Any]:
         """Read ``count`` elements as a read-only view, ``stride`` bytes apart if they are longer than known.
 
         Raises:
             MalformedPacketError: The payload ends, or the elements are shorter than known.
         """
-        known = np.dtype(dtype)
-        size = known.itemsize if stride is None else stride
+        size = dtype.itemsize if stride is None else stride
         start, self.offset = self.offset, self.offset + count * size
-        if self.offset > self.end or size < known.itemsize:
+        if self.offset > self.end or size < dtype.itemsize:
             raise self.fail("payload ends inside an array")
-        if size == known.itemsize:
-            return np.frombuffer(self.buffer, known, count, start)
-        return np.ndarray((count,), known, self.buffer, start, (size,))
+        if stride is None:
+            return np.frombuffer(self.buffer, dtype, count, start)
+        packed = np.frombuffer(self.buffer, np.uint8, count * size, start).reshape(count, size)
+        return packed[:, : dtype.itemsize].copy().view(dtype.base).reshape(count, *dtype.shape)
 
     def skip(self, size: int) -> None:
         """Pass over ``size`` bytes.
