@@ -18,13 +18,13 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 import numpy as np
-from tcr_hardware.calibration import RigidTransform
 
 from tcr_hardware.emulators.motive import MotiveEmulator
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.errors import HardwareError
+from tcr_hardware.rigid_transform import RigidTransform
 from tcrctl.emulated_robot import EmulatedRobot
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.fault_script import FaultScript, Player
@@ -37,6 +37,8 @@ from tcrctl.signals import Array
 
 #: The PLC's limits are wider than the soft limits of the rig file by this [um].
 MARGIN: Final = 5000
+#: That of the shipped experiments.
+SHIPPED_MISMATCH: Final = Mismatch(springs_youngs_modulus=0.7, density=1.2)
 #: How often the fault script looks at the time, and the main thread at the signals [s].
 TICK: Final = 0.005
 
@@ -55,7 +57,7 @@ class EmulationSettings:
         unicast_to: Where frames go in unicast: ``sender`` of the request or the ``data_port``.
     """
 
-    mismatch: Mismatch | None = Mismatch(springs_youngs_modulus=0.7, density=1.2)
+    mismatch: Mismatch | None = SHIPPED_MISMATCH
     noise: float = 50e-6
     rate: float = 240.0
     version: str = "4.1"
@@ -249,7 +251,7 @@ def _motive_settings(rig: RigFile, settings: EmulationSettings) -> MotiveSetting
         command_port=cameras.command_port,
         data_port=cameras.data_port or 1511,
         multicast=cameras.transport == "multicast",
-        **({"group": cameras.multicast_group} if cameras.multicast_group else {}),
+        group=cameras.multicast_group or MotiveSettings().group,
         unicast_to=settings.unicast_to,
         version=settings.version,
         rate_hz=settings.rate,

@@ -71,7 +71,8 @@ class EmulatedRobot:
             DivergenceError: If the simulation broke down.
         """
         self._advance()
-        return self._state.q.reshape(-1, 3)[self._rings]
+        nodes: Array = self._state.q.reshape(-1, 3)[self._rings]
+        return nodes
 
     def _advance(self) -> None:
         now = self._clock()

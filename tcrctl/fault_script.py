@@ -58,10 +58,10 @@ class Fault(Settings):
 def _unknown(fault: Fault) -> Iterator[tuple[Keys, str]]:
     if (fault.cameras is None) == (fault.plc is None):
         yield (), "must say what is wrong: either cameras or plc"
-    for name in fault.cameras if isinstance(fault.cameras, dict) else ():
+    for name, value in fault.cameras.items() if isinstance(fault.cameras, dict) else ():
         if name not in CAMERA_FAULTS:
             yield ("cameras", name), f"there is no such fault; known: {', '.join(CAMERA_FAULTS)}"
-        elif (wrong := _wrong_value(name, fault.cameras[name])) and isinstance(fault.cameras, dict):
+        elif wrong := _wrong_value(name, value):
             yield ("cameras", name), wrong
     if fault.plc is not None and fault.plc not in FAULTS:
         yield ("plc",), f"there is no fault {fault.plc}; known: {', '.join(FAULTS)}"

@@ -6,11 +6,15 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tcrctl.cli.options import AsJson
+
+if TYPE_CHECKING:
+    from tcrctl.emulate import EmulatedBench
+    from tcrctl.fault_script import FaultScript
 
 
 def emulate(
@@ -66,7 +70,9 @@ def emulate(
         print(json.dumps({"status": "ok", **result}))
 
 
-def _built(rig, faults, perfect, rate_hz):  # type: ignore[no-untyped-def]
+def _built(
+    rig: str, faults: Path | None, perfect: bool, rate_hz: float
+) -> tuple[EmulatedBench, FaultScript | None]:
     from tcrctl.compilation import announced_compilation
     from tcrctl.emulate import EmulatedBench, EmulationSettings
     from tcrctl.fault_script import load_fault_script
@@ -81,7 +87,7 @@ def _built(rig, faults, perfect, rate_hz):  # type: ignore[no-untyped-def]
         return EmulatedBench(file, settings), script
 
 
-def _places(rig: str, bench) -> str:  # type: ignore[no-untyped-def]
+def _places(rig: str, bench: EmulatedBench) -> str:
     host, port = bench.motive.address
     plcs = ", ".join(f"{name} {plc.address[0]}:{plc.address[1]}" for name, plc in bench.plcs.items())
     return f"rig {rig} is emulated: cameras {host}:{port}; PLC of {plcs}; Ctrl-C ends it"

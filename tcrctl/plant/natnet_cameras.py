@@ -9,22 +9,19 @@ from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
-from tcr_hardware.calibration import RigidTransform
-from tcr_hardware.markers import MarkerMap, MarkerMapError, NodeMarker
+from tcr_hardware.markers import Gate, MarkerMap, MarkerMapError, NodeMarker
 
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.natnet.client import NatNetClient
 from tcr_hardware.natnet.marker_frame import MarkerFrame
 from tcr_hardware.natnet.settings import NatNetSettings
+from tcr_hardware.rigid_transform import RigidTransform
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.devices import Sighting
 from tcrctl.plant.rig_settings import Calibration, CameraSettings, MarkerSettings
 from tcrctl.robot.model import node_index, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import RawFrame
-
-#: How long a first frame is waited for, to find out whether the cameras know the markers [s].
-FIRST_FRAME_S = 1.0
 
 
 @contextmanager
@@ -141,13 +138,12 @@ class NatNetCameras:
                     return self._mapped(frame)
 
     def _check_labels(self) -> None:
-        frame = self.client.wait_next(None, FIRST_FRAME_S)
+        models = self.client.models
         try:
-            if frame is not None:
-                self._map.locate(frame)
+            if models is not None:
+                self._map.resolve(models)
         except MarkerMapError as error:
-            raise InputError(f"the cameras do not know a marker of the rig file: {error}") from error
-        self._map.reset()
+            raise InputError(f"the rig file names markers in vain: {error}", hint=error.hint) from error
 
     def _newest(self, timeout: float) -> MarkerFrame | None:
         newest, last = self.client.newest(), self._last
@@ -189,12 +185,12 @@ def _marker_map(
     wanted = node_markers(markers, robot.n_modules)
     row_of = {row: i for i, row in enumerate(ring_rows(robot.n_modules))}
     nodes = [node_index(marker.node) for marker in wanted]
-    residual = cameras.max_residual_mm
+    residual, widest = cameras.max_residual_mm, cameras.jump_gate_mm / 1e3
     made = MarkerMap(
         wanted,
         robot.rest.q.reshape(-1, 3)[nodes],
         transform(calibration),
-        gate_m=cameras.jump_gate_mm / 1e3,
-        max_residual_m=None if residual is None else residual / 1e3,
+        gate=Gate(smallest_m=min(Gate().smallest_m, widest), largest_m=widest),
+        max_residual_m=np.inf if residual is None else residual / 1e3,
     )
     return made, np.array([row_of[node] for node in nodes], dtype=np.int64)

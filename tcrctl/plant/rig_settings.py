@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Literal, TypeAlias
 
@@ -32,7 +33,7 @@ class CameraSettings(Settings):
     allow_newer: bool = Field(default=False, description="decode versions newer than those that were tested")
     up_axis: Literal["y", "z"] = Field(default="y", description="as set in Motive; only for rig calibrate")
     jump_gate_mm: float = quantity(
-        "mm", "a marker that jumps further between two frames is not used", 15, gt=0
+        "mm", "a marker that has jumped further is not used; less than half the marker distance", 24.0, gt=0
     )
     max_residual_mm: float | None = quantity("mm", "markers with a larger residual are not used", None, gt=0)
 
@@ -74,11 +75,18 @@ class MarkerSettings(Settings):
 class Calibration(Settings):
     """Where the cameras' frame lies in the robot's: x_robot = rotation (scale x_camera) + translation."""
 
-    quaternion: tuple[float, float, float, float] = Field(
-        default=(0.0, 0.0, 0.0, 1.0), description="rotation, x y z w"
+    quaternion_xyzw: tuple[float, float, float, float] = Field(
+        default=(0.0, 0.0, 0.0, 1.0), description="rotation, a unit quaternion"
     )
     translation_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     scale_m: float = quantity("m", "length of the cameras' unit; Motive streams metres", 1.0, gt=0)
+
+    @model_validator(mode="after")
+    def _unit_length(self) -> Calibration:
+        length = math.sqrt(sum(x * x for x in self.quaternion_xyzw))
+        if abs(length - 1.0) > 1e-3:
+            refuse([(("quaternion_xyzw",), f"must have length 1, not {length:.4g}")])
+        return self
 
 
 class _Plc(Settings):
