@@ -47,7 +47,7 @@ class FakeCameras:
     last: float = -1.0
     error: DeviceError | None = None
 
-    def next(self, timeout):
+    def next(self, timeout, *, fresh):
         if self.error is not None:
             raise self.error
         if self.silent:

@@ -96,17 +96,14 @@ def test_the_end_of_a_run_is_a_controlled_stop_and_disarmed():
     assert (bench.cameras.closed, bench.drives.closed) == (1, 1)
 
 
-def test_no_frame_in_time_is_a_measurement_without_markers_and_the_drives_are_held():
+def test_without_a_frame_in_time_the_last_one_is_repeated_and_the_drives_are_held():
     bench = started()
-    bench.run(command(), 3)
-    held_at = bench.targets()[-1]
+    last = bench.run(command(), 3)[-1][0]
     bench.cameras.silent = True
-    measured, applied = bench.step(command())
-    assert not measured.valid.any()
-    assert measured.raw is None
     while bench.state == "running":
         measured, applied = bench.step(command())
-        held_at = bench.targets()[-1] if bench.state == "running" else held_at
+    assert (measured.t, measured.raw) == (last.t, None)
+    assert measured.valid.all()
     assert bench.state == "holding"
     assert not applied.speed.any()
     bench.cameras.silent = False

@@ -49,7 +49,7 @@ def test_the_drives_follow_only_while_running_or_holding(state):
     assert control.follow == (state in (State.RUNNING, State.HOLDING))
     assert control.permit == (state in (*MOVING, State.ZEROING))
     assert control.enable == (state not in (State.DISARMED, State.FAULTED))
-    assert not (control.reset or control.zero)
+    assert (control.reset, control.zero) == (False, False)
 
 
 REFUSED = {

@@ -39,8 +39,12 @@ class Cameras(Protocol):
 
     rate: float
 
-    def next(self, timeout: float) -> Sighting | None:
+    def next(self, timeout: float, *, fresh: bool) -> Sighting | None:
         """The newest frame not returned before; None if none comes within ``timeout`` [s].
+
+        Args:
+            timeout: How long a frame is waited for [s].
+            fresh: Wait for the next one to arrive, and take one that is here already only if none does.
 
         Raises:
             DeviceError: If the stream cannot be understood any more.

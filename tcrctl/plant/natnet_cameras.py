@@ -9,9 +9,9 @@ from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
-from tcr_hardware.markers import Gate, MarkerMap, MarkerMapError, NodeMarker
 
 from tcr_hardware.errors import HardwareError
+from tcr_hardware.markers import Gate, MarkerMap, MarkerMapError, NodeMarker
 from tcr_hardware.natnet.client import NatNetClient
 from tcr_hardware.natnet.marker_frame import MarkerFrame
 from tcr_hardware.natnet.settings import NatNetSettings
@@ -120,22 +120,31 @@ class NatNetCameras:
 
     _last: MarkerFrame | None
 
-    def next(self, timeout: float) -> Sighting | None:
+    def next(self, timeout: float, *, fresh: bool) -> Sighting | None:
         """The newest frame not returned before; one that repeats the last bit for bit is none.
 
         Cameras have noise: a frame that equals the one before was not taken anew.
         """
         end = time.monotonic() + timeout
         with device_errors(f"cameras at {self._settings.server}"):
-            while True:
-                frame = self._newest(max(0.0, end - time.monotonic()))
-                if frame is None:
-                    return None
-                self._last = frame
-                bits = frame.data.markers["position"].tobytes() + frame.data.unlabelled.tobytes()
-                if bits != self._bits or not bits:
-                    self._bits = bits
-                    return self._mapped(frame)
+            waiting = self._unseen()
+            frame = waiting if waiting is not None and not fresh else self._awaited(end) or waiting
+            while frame is not None and not self._is_new(frame):
+                frame = self._awaited(end)
+        return None if frame is None else self._mapped(frame)
+
+    def _unseen(self) -> MarkerFrame | None:
+        """The newest frame, if it was not looked at before."""
+        newest, last = self.client.newest(), self._last
+        return None if newest is None or (last and newest.sequence <= last.sequence) else newest
+
+    def _awaited(self, end: float) -> MarkerFrame | None:
+        return self.client.wait_next(self.client.newest(), max(0.0, end - time.monotonic()))
+
+    def _is_new(self, frame: MarkerFrame) -> bool:
+        bits = frame.data.markers["position"].tobytes() + frame.data.unlabelled.tobytes()
+        new, self._last, self._bits = bits != self._bits or not bits, frame, bits
+        return new
 
     def _check_labels(self) -> None:
         models = self.client.models
@@ -144,12 +153,6 @@ class NatNetCameras:
                 self._map.resolve(models)
         except MarkerMapError as error:
             raise InputError(f"the rig file names markers in vain: {error}", hint=error.hint) from error
-
-    def _newest(self, timeout: float) -> MarkerFrame | None:
-        newest, last = self.client.newest(), self._last
-        if newest is not None and (last is None or newest.sequence > last.sequence):
-            return newest
-        return self.client.wait_next(last, timeout)
 
     def _mapped(self, frame: MarkerFrame) -> Sighting:
         located = self._map.locate(frame)

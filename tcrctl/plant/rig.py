@@ -29,6 +29,8 @@ from tcrctl.signals import Array, Command, Measurement, Truth
 CYCLE: Final = 0.02
 #: A drive that moves less than this in a cycle stands still [um].
 STILL: Final = 20
+#: How long usable frames are waited for before arming is refused [s].
+FIRST_LOOK: Final = 1.0
 #: A tick waits for a frame at most this many frame intervals, then goes on with what it knows.
 PATIENCE: Final = 1.5
 
@@ -94,7 +96,7 @@ class RigPlant:
     def read(self) -> Measurement:
         """The next camera frame, and where the drives are.
 
-        If no frame comes in time, no marker of the measurement is valid.
+        If no frame comes in time, it is the last one again, with the time at which it was taken.
 
         Raises:
             RigStopError: If the supervisor ends the run.
@@ -102,7 +104,7 @@ class RigPlant:
         """
         if self._ask(self._drives.status):
             self._count_refusals()
-        measured = self._measurement(self._cameras.next(PATIENCE / self._cameras.rate))
+        measured = self._measurement(self._frame())
         self._supervise()
         return measured
 
@@ -144,9 +146,7 @@ class RigPlant:
             ArmingRefusedError: If a condition is not met; nothing has moved.
             DeviceError: If the drives are lost.
         """
-        self._ask(self._drives.status)
-        self._measurement(self._cameras.next(PATIENCE / self._cameras.rate))
-        self.supervisor.check_ready(self._sight(), confirmed=self._session.confirmed)
+        self.supervisor.check_ready(self.look(), confirmed=self._session.confirmed)
         self.arm(f"operator agreed; measurement {1e3 * self._sight().age:.0f} ms old")
 
     def arm(self, cause: str) -> None:
@@ -202,10 +202,16 @@ class RigPlant:
         return self._status.position
 
     def look(self) -> Sight:
-        """Ask cameras and drives once and return what is known, without any consequence."""
+        """Ask cameras and drives and return what is known, without any consequence.
+
+        A frame that has waited here for too long is no sign of bad cameras, so others get their chance.
+        """
         self._ask(self._drives.status)
-        self._measurement(self._cameras.next(PATIENCE / self._cameras.rate))
-        return self._sight()
+        end = self._clock() + FIRST_LOOK
+        while True:
+            self._measurement(self._frame())
+            if self._sight().age < self._limits.rules.stale or self._clock() >= end:
+                return self._sight()
 
     def _come_to_rest(self) -> None:
         self.supervisor.stop(self._clock(), "end of the run")
@@ -241,22 +247,29 @@ class RigPlant:
             points.take_back()
         self._rejects = self._rejects + 1 if status.reject else 0
 
+    def _frame(self) -> Sighting | None:
+        """The next frame if the cameras are much faster than the loop, else the newest."""
+        interval = 1.0 / self._cameras.rate
+        return self._cameras.next(PATIENCE * interval, fresh=interval <= 0.5 * self._period)
+
     def _measurement(self, sighting: Sighting | None) -> Measurement:
         now, run_time = self._clock(), self._session.time()
         drive = np.zeros(0) if self._status is None else np.asarray(1e-6 * self._status.position, float)
         if sighting is None:
-            return self._blind(run_time, drive)
+            return self._last_seen(run_time - now, drive)
         self._seen = sighting
         if np.count_nonzero(sighting.valid) >= self._limits.min_seen * self._limits.mapped:
             self._usable_at = sighting.taken
         taken = run_time - (now - sighting.taken)
         return Measurement(taken, sighting.nodes, sighting.valid, drive, sighting.raw)
 
-    def _blind(self, t: float, drive: Array) -> Measurement:
-        """What is known if no frame came: where the markers were last, none of them valid."""
+    def _last_seen(self, epoch: float, drive: Array) -> Measurement:
+        """What is known if no frame came; ``epoch`` is the time of the run at time 0 of the clock."""
         seen = self._seen
-        nodes = np.zeros((self._limits.nodes, 3), np.float32) if seen is None else seen.nodes
-        return Measurement(t, nodes, np.zeros(len(nodes), np.bool_), drive)
+        if seen is None:
+            nobody = np.zeros(self._limits.nodes, np.bool_)
+            return Measurement(epoch + self._clock(), np.zeros((nobody.size, 3), np.float32), nobody, drive)
+        return Measurement(epoch + seen.taken, seen.nodes, seen.valid, drive)
 
     # --- supervision ---
 
