@@ -13,8 +13,8 @@ import typer
 from tcrctl.cli.options import AsJson
 
 if TYPE_CHECKING:
-    from tcrctl.emulate import EmulatedBench
-    from tcrctl.fault_script import FaultScript
+    from tcrctl.emulate.bench import EmulatedBench
+    from tcrctl.emulate.fault_script import FaultScript
 
 
 def emulate(
@@ -51,7 +51,7 @@ def emulate(
 
     with signals_exit():
         bench, script = _built(rig, faults, perfect, rate_hz)
-    from tcrctl.emulate import emulate as keep_going
+    from tcrctl.emulate.bench import emulate as keep_going
 
     with Interruption() as interruption, bench:
         _say(_places(rig, bench))
@@ -74,8 +74,8 @@ def _built(
     rig: str, faults: Path | None, perfect: bool, rate_hz: float
 ) -> tuple[EmulatedBench, FaultScript | None]:
     from tcrctl.compilation import announced_compilation
-    from tcrctl.emulate import EmulatedBench, EmulationSettings
-    from tcrctl.fault_script import load_fault_script
+    from tcrctl.emulate.bench import EmulatedBench, EmulationSettings
+    from tcrctl.emulate.fault_script import load_fault_script
     from tcrctl.plant.rig_file import read_rig
 
     file, *_ = read_rig(rig)
