@@ -62,7 +62,7 @@ class RtuPort:
         """Collect frames and answer them."""
         line, buffer = self._descriptors[0], b""
         while not self._stopped.is_set():
-            if not select.select([line], [], [], GAP_S if buffer else 5 * GAP_S)[0]:
+            if not select.select([line], [], [], GAP_S if buffer else 2 * GAP_S)[0]:
                 buffer = b""
                 continue
             try:

@@ -54,11 +54,16 @@ class ModbusServer:
 
     def answer(self, request: bytes) -> bytes | None:
         """Answer to a request, both without framing; None if there is to be none."""
-        function = request[0]
         if self._faults.take("silence") is not None:
             return None
+        answer = self._carried_out(request)
         if (late := self._faults.take("delay")) is not None:
             time.sleep(float(late["seconds"] or 0.0))
+        return answer
+
+    def _carried_out(self, request: bytes) -> bytes:
+        """Carry a request out, if it is one."""
+        function = request[0]
         try:
             self._refuse(function)
             return bytes([function]) + self._function(function)(request[1:])

@@ -13,6 +13,8 @@ from tcr_hardware.errors import HardwareError
 
 #: How often the acceptor looks whether it may listen [s].
 LOOK_S = 0.02
+#: How long a connection may need for an answer that it has begun, when it is reset [s].
+LONGEST_ANSWER_S = 1.0
 #: Unit numbers that a TCP server takes for itself (Modbus messaging on TCP/IP V1.0b, section 4.4.2.1).
 ANY_UNIT = (0, 255)
 LONGEST_BODY = 254
@@ -33,7 +35,7 @@ class TcpPort:
         """
         self._server, self._faults = server, faults
         self._stopped, self._lock = threading.Event(), threading.Lock()
-        self._connections: set[socket.socket] = set()
+        self._connections: dict[socket.socket, threading.Thread] = {}
         self._listener: socket.socket | None = _listen(address)
         self.address: tuple[str, int] = self._listener.getsockname()[:2]
         self._thread = threading.Thread(target=self._accept, name="plc-tcp", daemon=True)
@@ -46,14 +48,14 @@ class TcpPort:
         self.reset()
 
     def reset(self) -> None:
-        """Reset all connections, as a PLC does that is switched off."""
+        """Reset all connections, as a PLC does that is switched off; returns when they are gone."""
         with self._lock:
-            connections, self._connections = self._connections, set()
-        for connection in connections:
+            connections, self._connections = self._connections, {}
+        for connection, thread in connections.items():
             with suppress(OSError):
                 connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-                connection.shutdown(socket.SHUT_RD)  # wakes the thread that reads
-            connection.close()
+                connection.shutdown(socket.SHUT_RD)  # wakes the thread, which closes
+            thread.join(LONGEST_ANSWER_S)
 
     def _accept(self) -> None:
         """Take connections until stopped; while connections are refused, do not listen."""
@@ -62,6 +64,7 @@ class TcpPort:
             if refused and self._listener is not None:
                 self._listener.close()
                 self._listener = None
+                self.reset()
             elif not refused and self._listener is None:
                 with suppress(HardwareError):
                     self._listener = _listen(self.address)
@@ -70,9 +73,10 @@ class TcpPort:
                 continue
             with suppress(TimeoutError):
                 connection, _ = self._listener.accept()
+                thread = threading.Thread(target=self._serve, args=(connection,), daemon=True)
                 with self._lock:
-                    self._connections.add(connection)
-                threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+                    self._connections[connection] = thread
+                thread.start()
         if self._listener is not None:
             self._listener.close()
 
@@ -85,8 +89,8 @@ class TcpPort:
                 if protocol or not 2 <= length <= LONGEST_BODY:
                     break
                 body = stream.read(length - 1)
-                if len(body) < length - 1:
-                    break
+                if len(body) < length - 1 or connection not in self._connections:
+                    break  # ended, or reset
                 if unit not in (self._server.unit, *ANY_UNIT):
                     continue
                 answer = self._server.answer(body)
@@ -94,7 +98,7 @@ class TcpPort:
                     frame = struct.pack(">HHHB", transaction, 0, len(answer) + 1, unit) + answer
                     connection.sendall(self._server.spoil(frame))
         with self._lock:
-            self._connections.discard(connection)
+            self._connections.pop(connection, None)
 
 
 def _listen(address: tuple[str, int]) -> socket.socket:

@@ -27,8 +27,8 @@ FAULTS: Mapping[str, FaultKind] = MappingProxyType({
     "exception": FaultKind(
         "answers with a Modbus exception", {"code": 4, "function": None, "count": None}
     ),
-    "silence": FaultKind("does not answer", {"count": None}),
-    "delay": FaultKind("answers late, in order", {"seconds": 0.1, "count": None}),
+    "silence": FaultKind("takes no notice of requests", {"count": None}),
+    "delay": FaultKind("carries requests out in time, answers late, in order", {"seconds": 0.1, "count": None}),
     "wrong_echo": FaultKind(
         "confirms writes at a wrong address (function 23: reads one register too few)", {"count": None}
     ),

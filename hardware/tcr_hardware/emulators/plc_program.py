@@ -203,15 +203,13 @@ class PlcProgram:
         return self.fault is Fault.NONE and self.zeroed and not self.stopping
 
     def _permit(self, command: PlcCommand, rising: Control) -> None:
-        """Enable on the edge, bumpless; stop without ENABLE or RUN."""
+        """Enable on the edge, with the set-points that the drives hold already; stop without ENABLE or RUN."""
         wanted = Control.ENABLE in command.control and Control.RUN in command.control
         if self.enabled and not wanted:
             self._stop()
         elif Control.ENABLE in rising and wanted and self._ready():
             self.enabled = True
             self._silence_s = 0.0
-            self.active = self.positions()
-            self._target, self._speed = list(self.active), [0.0] * len(self.servos)
         self._following = self.enabled and Control.FOLLOW in command.control
 
     def _take(self, command: PlcCommand, dt: float) -> None:

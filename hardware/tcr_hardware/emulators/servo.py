@@ -63,6 +63,11 @@ class Servo:
 
 
 def braking_speed(distance: float, limits: ServoSettings, dt: float) -> float:
-    """Largest speed from which a drive stops within a distance, when its speed changes once per ``dt`` only."""
+    """Largest speed from which a drive stops within a distance, when its speed changes once per ``dt`` only.
+
+    Braking from (n + f) steps of speed, 0 <= f < 1, takes (n + 1) (n / 2 + f) steps of distance.
+    """
     change = limits.acceleration_um_s2 * dt
-    return math.sqrt(2.0 * limits.acceleration_um_s2 * distance + 0.25 * change * change) - 0.5 * change
+    steps = distance / (change * dt)
+    whole = math.floor(0.5 * (math.sqrt(1.0 + 8.0 * steps) - 1.0))
+    return change * (whole + steps / (whole + 1) - 0.5 * whole)

@@ -34,6 +34,8 @@ from tcr_hardware.modbus.wire_time import share_of_period
 from tcr_hardware.modbus.words import BYTE_ORDERS, WORD_ORDERS, WordCodec
 
 ILLEGAL_FUNCTION = 1
+#: A PLC that was restarted has seen the last write after this time [s]: one cycle of its program.
+SCAN_S = 0.01
 
 T = TypeVar("T")
 
@@ -188,6 +190,9 @@ class PlcBus:
                 self._count(error)
                 if number > retries or time.monotonic() > last_start:
                     raise
+                if isinstance(error, StaleAnswerError):
+                    self._link.distrust()
+                    time.sleep(SCAN_S)
             number += 1
             self.statistics.retries += 1
 
@@ -197,6 +202,7 @@ class PlcBus:
         if self._info is None:
             raise LinkLostError("the bus to the PLC is not open")
         self._link.open()
+        self._liveness = Liveness()
         self.statistics.reconnects += 1
         if (found := self._identify()) != codec:
             raise PlcMismatchError("ORDER_PROBE", f"{found.word_order}", codec.word_order)

@@ -89,6 +89,10 @@ class ModbusLink:
         with suppress(OSError):
             self._client.close()  # type: ignore[no-untyped-call]
 
+    def distrust(self) -> None:
+        """Settle a serial line before the next request."""
+        self._unsure = True
+
     def read(self, address: int, count: int) -> list[int]:
         """Read registers (count,) from ``address`` on.
 

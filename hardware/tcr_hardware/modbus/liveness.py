@@ -18,7 +18,7 @@ class Liveness:
 
     def __init__(self) -> None:
         self._seen: dict[str, tuple[int, int, float]] = {}  # register -> value, repetitions, since when
-        self._echo: int | None = None
+        self._echo: int | None = None  # of the last answer; a PLC that was just connected may show any
 
     def check(self, status: PlcStatus, heartbeat: int, *, wrote: bool) -> None:
         """Judge one answer.
@@ -32,11 +32,10 @@ class Liveness:
             StaleAnswerError: It is the answer of an earlier request.
             PlcFrozenError: A counter stands still.
         """
-        behind = (heartbeat - status.heartbeat_echo) & 0xFFFF
-        backwards = self._echo is not None and (status.heartbeat_echo - self._echo) & 0xFFFF > 0x8000
-        if behind > ECHO_WINDOW or backwards:
-            self._echo = None  # a PLC that was restarted counts anew
-            raise StaleAnswerError("HB_ECHO", heartbeat, status.heartbeat_echo)
+        if self._echo not in (None, status.heartbeat_echo):
+            behind = (heartbeat - status.heartbeat_echo) & 0xFFFF
+            if behind > ECHO_WINDOW or (status.heartbeat_echo - self._echo) & 0xFFFF > 0x8000:
+                raise StaleAnswerError("HB_ECHO", heartbeat, status.heartbeat_echo)
         self._echo = status.heartbeat_echo
         self._follow("PLC_CYCLE", status.plc_cycle, status.t_s)
         if wrote:

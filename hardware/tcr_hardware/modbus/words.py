@@ -6,11 +6,13 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 from tcr_hardware.modbus.errors import PlcMismatchError, SetpointError
 from tcr_hardware.modbus.registers import MAGIC, ORDER_PROBE, Register
 
 RANGES = {"u16": (0, 0xFFFF), "i16": (-0x8000, 0x7FFF), "int32": (-0x80000000, 0x7FFFFFFF)}
+LARGEST_FLOAT32 = 3.4e38
 WORD_ORDERS = ("high_first", "low_first")
 BYTE_ORDERS = ("big", "little")
 
@@ -68,14 +70,15 @@ class WordCodec:
         return word if self.byte_order == "big" else (word & 0xFF) << 8 | word >> 8
 
 
-def _raw(register: Register, value: float) -> float:
+def _raw(register: Register, value: object) -> float:
     """Counts of a value."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise SetpointError(register.name, value, "finite numbers")
-    counts = value / register.scale
-    if register.kind == "float32":
+    counts = float(value) / register.scale
+    if register.kind == "float32" and abs(counts) <= LARGEST_FLOAT32:
         return counts
-    counts, (lowest, highest) = round(counts), RANGES[register.kind]
+    lowest, highest = RANGES.get(register.kind, (-LARGEST_FLOAT32, LARGEST_FLOAT32))
+    counts = round(counts)
     if not lowest <= counts <= highest:
         unit = f" {register.unit}" if register.unit else ""
         raise SetpointError(
