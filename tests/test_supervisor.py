@@ -48,7 +48,7 @@ def test_the_drives_follow_only_while_running_or_holding(state):
     control = made(state)[0].control
     assert control.follow == (state in (State.RUNNING, State.HOLDING))
     assert control.permit == (state in (*MOVING, State.ZEROING))
-    assert control.enable == (state not in (State.DISARMED, State.FAULTED))
+    assert control.enable == (state in (*MOVING, State.STOPPING))
     assert (control.reset, control.zero) == (False, False)
 
 

@@ -25,9 +25,9 @@ from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.rigid_transform import RigidTransform
+from tcrctl.emulate.fault_script import FaultScript, Player
 from tcrctl.emulate.robot import EmulatedRobot
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.emulate.fault_script import FaultScript, Player
 from tcrctl.plant.natnet_cameras import transform
 from tcrctl.plant.rig_settings import CableDrive, ModbusTcp, MountedRobot, RigFile
 from tcrctl.plant.settings import Mismatch

@@ -15,7 +15,7 @@ What the states tell the drives:
 
     state     enable  follow  permit    set-points
     DISARMED                            none
-    ZEROING     x               x       present positions, tension-zero edge
+    ZEROING                     x       present positions, tension-zero edge
     ARMED       x               x       present positions
     RUNNING     x       x       x       the controller's, inside all limits
     HOLDING     x       x       x       the last ones again, so that the watchdog is fed
@@ -66,7 +66,7 @@ _NEXT: Final = {
 }
 _CONTROL: Final = {
     State.DISARMED: DriveControl(),
-    State.ZEROING: DriveControl(enable=True, permit=True),
+    State.ZEROING: DriveControl(permit=True),
     State.ARMED: DriveControl(enable=True, permit=True),
     State.RUNNING: DriveControl(enable=True, follow=True, permit=True),
     State.HOLDING: DriveControl(enable=True, follow=True, permit=True),
