@@ -18,6 +18,7 @@ from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.recover import recover
+from tcrctl.cli.rig import RIG_VERBS
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
@@ -62,6 +63,10 @@ def build_app() -> typer.Typer:
     app.callback()(_options)
     for name, verb in VERBS.items():
         app.command(name)(verb)
+    rig = typer.Typer(no_args_is_help=True, rich_markup_mode="rich")
+    for name, verb in RIG_VERBS.items():
+        rig.command(name)(verb)
+    app.add_typer(rig, name="rig", help="Work on a bench: check, status, calibrate, zero, jog, reset.")
     return app
 
 
