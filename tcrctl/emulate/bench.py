@@ -87,6 +87,7 @@ class EmulatedBench:
 
         Raises:
             InputError: If the rig file cannot be emulated.
+            DeviceError: If the port of the cameras is taken.
         """
         self._rig, self._settings, built = rig, settings, robots or {}
         self._random = np.random.default_rng(settings.seed)
@@ -101,7 +102,14 @@ class EmulatedBench:
             self.robots[name] = self._moved(name, mounted, robot)
             self._back[name] = transform(mounted.calibration)
             names += _labels(mounted, robot)
-        self.motive = MotiveEmulator(names, self._markers, _motive_settings(rig, settings))
+        try:
+            self.motive = MotiveEmulator(names, self._markers, _motive_settings(rig, settings))
+        except OSError as error:
+            where = f"{rig.cameras.server}:{rig.cameras.command_port}"
+            hint = "Is another tcrctl emulate running?"
+            raise DeviceError(
+                f"cameras cannot be emulated at {where}: {error.strerror}", hint=hint
+            ) from error
         self._opened = ExitStack()
 
     def _moved(self, name: str, mounted: MountedRobot, robot: Robot) -> EmulatedRobot:

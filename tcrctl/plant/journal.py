@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
@@ -10,6 +12,8 @@ from tcrctl.errors import LogError
 
 #: Levels that are also told to the user at once.
 LOUD: Final = ("warning", "error", "fatal")
+
+_DIGITS: Final = re.compile(r"[0-9.]+")
 
 Sink = Callable[[float, str, str, str], None]
 
@@ -25,6 +29,7 @@ class Journal:
             notify: Takes warnings and errors for the user.
         """
         self._time, self._notify = time, notify
+        self._times: Counter[str] = Counter()
         self._waiting: list[tuple[float, str, str, str]] = []
         self._sink: Sink | None = None
 
@@ -39,7 +44,15 @@ class Journal:
         """Take an event that happens now."""
         self._write((self._time(), kind, level, text))
         if level in LOUD:
-            self._notify(f"{level}: {text}")
+            self._tell(level, text)
+
+    def _tell(self, level: str, text: str) -> None:
+        """Tell the user; what repeats itself only the 1st, 2nd, 4th, 8th ... time. The log has all."""
+        sort = _DIGITS.sub("", text)
+        self._times[sort] += 1
+        times = self._times[sort]
+        if times & (times - 1) == 0:
+            self._notify(f"{level}: {text}{f' ({times} times so far)' if times > 2 else ''}")
 
     def _write(self, event: tuple[float, str, str, str]) -> None:
         if self._sink is None:
