@@ -23,7 +23,7 @@ from tcr_hardware.natnet.protocol import Message, ServerInfo, Version
 from tcr_hardware.natnet.receiver import Receiver
 from tcr_hardware.natnet.session import Session
 from tcr_hardware.natnet.settings import NatNetSettings
-from tcr_hardware.natnet.sockets import Sockets, resolve
+from tcr_hardware.natnet.sockets import Sockets, refuses, resolve
 from tcr_hardware.natnet.statistics import Statistics
 
 #: A request is repeated after so long without an answer [s].
@@ -71,7 +71,7 @@ class NatNetClient:
         self._session.on_response = self._answered
         self._receiver = Receiver(Sockets.open(self.settings), self._session, self._inbox, server)
         try:
-            return self._await_server(timeout_s)
+            return self._await_server(server, timeout_s)
         except HardwareError:
             self.close()
             raise
@@ -173,12 +173,14 @@ class NatNetClient:
             raise RequestRefusedError(text, "that it does not know it")
         return payload
 
-    def _await_server(self, timeout_s: float) -> ServerInfo:
+    def _await_server(self, address: tuple[str, int], timeout_s: float) -> ServerInfo:
         self._inbox.wait(lambda: self._session.ready, timeout_s)
         self._inbox.check()
         server, problem = self._session.server, self._session.last_problem
         if server is None:
             hint = problem or "Is Motive running and streaming, at the interface of the camera network?"
+            if refuses(address):
+                hint = "Nobody listens at that port: is Motive running, and the command port right?"
             raise ServerSilentError(self.settings.address, "answer", timeout_s, hint=hint)
         if not self._session.ready:
             raise ServerSilentError(self.settings.address, "model definitions", timeout_s, hint=problem)

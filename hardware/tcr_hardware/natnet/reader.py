@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tcr_hardware.natnet.errors import MalformedPacketError
 
-#: Named things in one packet. A real one has hundreds; the limit bounds what a corrupt packet can cost.
-MOST_ITEMS = 2000
+#: Things of varying length in one packet. A real one has dozens; the limit bounds what a corrupt packet can cost.
+MOST_ITEMS = 1000
 LONGEST_NAME = 256
 _INTEGER = struct.Struct("<i")
 
@@ -46,9 +46,10 @@ class Reader:
         Raises:
             MalformedPacketError: The payload ends.
         """
-        start, self.offset = self.offset, self.offset + 4
-        if self.offset > self.end:
+        start = self.offset
+        if start + 4 > self.end:
             raise self.fail("payload ends inside a number")
+        self.offset = start + 4
         value: int = _INTEGER.unpack_from(self.buffer, start)[0]
         return value
 
@@ -58,9 +59,10 @@ class Reader:
         Raises:
             MalformedPacketError: The payload ends.
         """
-        start, self.offset = self.offset, self.offset + layout.size
-        if self.offset > self.end:
+        start = self.offset
+        if start + layout.size > self.end:
             raise self.fail("payload ends inside a number")
+        self.offset = start + layout.size
         return layout.unpack_from(self.buffer, start)
 
     def count(self, what: str, smallest: int) -> int:
@@ -104,10 +106,10 @@ class Reader:
         Raises:
             MalformedPacketError: The payload ends, or the elements are shorter than known.
         """
-        size = dtype.itemsize if stride is None else stride
-        start, self.offset = self.offset, self.offset + count * size
-        if self.offset > self.end or size < dtype.itemsize:
+        start, size = self.offset, dtype.itemsize if stride is None else stride
+        if start + count * size > self.end or size < dtype.itemsize:
             raise self.fail("payload ends inside an array")
+        self.offset = start + count * size
         if stride is None:
             return np.frombuffer(self.buffer, dtype, count, start)
         packed = np.frombuffer(self.buffer, np.uint8, count * size, start).reshape(count, size)

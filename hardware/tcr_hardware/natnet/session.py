@@ -9,6 +9,7 @@ Beside it run the keep-alive (unicast) and the echo that dates the server's cloc
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 
 from tcr_hardware.natnet import protocol
@@ -28,6 +29,8 @@ from tcr_hardware.natnet.version_choice import VersionChoice
 #: So many packets in a row that cannot be read: ask the server anew who it is.
 MALFORMED_IN_A_ROW = 5
 RETRY_S = 0.25
+#: Clock requests that may still be answered; older ones are given up.
+ECHOES = 4
 
 
 class Session:
@@ -59,6 +62,7 @@ class Session:
         self._in_a_row = 0
         self._heard = now
         self._models_changing = False
+        self._echoes: deque[int] = deque(maxlen=ECHOES)
         self._timers = Timers(
             now, connect=RETRY_S, bitstream=RETRY_S, models=RETRY_S, keep_alive=settings.keep_alive_s,
             echo=settings.echo_s, silence=settings.silence_s,
@@ -101,7 +105,9 @@ class Session:
         if not self.settings.multicast and self._timers.due("keep_alive", now):
             wanted.append(protocol.envelope(Message.KEEPALIVE))
         if self.clock.hz and self._timers.due("echo", now):
-            wanted.append(protocol.echo_request(round(now * 1e9)))
+            client_ns = round(now * 1e9)
+            self._echoes.append(client_ns)
+            wanted.append(protocol.echo_request(client_ns))
         return wanted
 
     def next_due(self, now: float) -> float:
@@ -132,7 +138,8 @@ class Session:
     def _server_info(self, info: ServerInfo, now: float) -> None:
         """The server introduced itself: for the first time, again, or as another one."""
         same, self.server = info == self.server, info
-        if same and self.choice.stream is not None and self._in_a_row < MALFORMED_IN_A_ROW:
+        settling = self.choice.pending or self.choice.stream is not None
+        if same and settling and self._in_a_row < MALFORMED_IN_A_ROW:
             return
         self._in_a_row = 0
         self.choice.server_speaks(info.version)
@@ -176,10 +183,10 @@ class Session:
 
     def _echo(self, payload: bytes, now: float) -> None:
         client_ns, ticks = protocol.decode_echo(payload)
-        sent = client_ns * 1e-9
-        if not 0.0 <= now - sent <= 1.0:
-            raise MalformedPacketError("echo of a request that we did not just send", 0, len(payload))
-        if self.clock.add(sent, now, ticks):
+        if client_ns not in self._echoes:
+            raise MalformedPacketError("echo of a request that we did not send", 0, len(payload))
+        self._echoes.remove(client_ns)
+        if self.clock.add(client_ns * 1e-9, now, ticks):
             self.last_problem = "the server's clock jumped"
             self._forget_models()
 

@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass, field
 
 from tcr_hardware.errors import SocketError
-from tcr_hardware.natnet.protocol import DATA_PORT, MULTICAST_GROUP, ServerInfo
+from tcr_hardware.natnet.protocol import DATA_PORT, MULTICAST_GROUP, ServerInfo, connect
 from tcr_hardware.natnet.settings import NatNetSettings
 
 #: Holds half a second of large frames while Python is busy.
@@ -24,6 +24,21 @@ def resolve(host: str) -> str:
         return socket.gethostbyname(host)
     except OSError as error:
         raise SocketError(host, str(error), hint="Check the name or address of the server.") from None
+
+
+def refuses(address: tuple[str, int]) -> bool:
+    """Whether the computer at ``address`` says that nobody listens at that port; False if it says nothing."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.settimeout(0.1)
+        try:
+            probe.connect(address)  # only a connected socket is told
+            probe.send(connect())
+            probe.recv(1)
+        except ConnectionRefusedError:
+            return True
+        except OSError:
+            pass
+    return False
 
 
 def _udp() -> socket.socket:
