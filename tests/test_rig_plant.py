@@ -192,6 +192,29 @@ def test_a_refused_set_point_is_not_built_upon_and_three_end_the_run():
     assert np.abs(np.diff(bench.targets(), axis=0)).max() <= STEP
 
 
+def test_answers_to_questions_do_not_hide_that_commands_fail():
+    bench = started()
+    bench.run(command(), 3)
+    exchange, lost = bench.drives.exchange, bench.clock.time
+
+    def fails(target, control):
+        exchange(target, control)
+        raise DeviceError("echoes a wrong address")
+
+    bench.drives.exchange = fails
+    with pytest.raises(DeviceError, match="echoes a wrong address"):
+        bench.run(command(), 20)
+    assert bench.clock.time - lost <= 0.1 + 2 * PERIOD
+
+
+def test_set_points_that_are_not_acknowledged_count_as_refused():
+    bench = started()
+    bench.run(command(), 3)
+    bench.drives.say(acknowledged=False)
+    with pytest.raises(RigStopError, match="refused 3 set-points in a row: it was not acknowledged"):
+        bench.run(command(), 10)
+
+
 def test_a_drive_that_lags_behind_ends_the_run():
     bench = started()
     bench.drives.follows = False

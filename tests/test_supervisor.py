@@ -57,7 +57,7 @@ REFUSED = {
     "no answer": (replace(GOOD, trouble="timeout"), True, "do not answer timeout"),
     "never seen": (replace(GOOD, status=None), True, "do not answer"),
     "stale": (replace(GOOD, age=0.06), True, "60 ms old"),
-    "no frame ever": (replace(GOOD, age=np.inf), True, "old"),
+    "no frame ever": (replace(GOOD, age=np.inf), True, "shown no usable"),
     "not zeroed": (status(zeroed=False), True, "tcrctl rig zero"),
     "local": (status(remote=False), True, "remote"),
     "no echo": (status(acknowledged=False), True, "acknowledge"),
@@ -94,11 +94,11 @@ FAULTS = {
     "drives off": (status(enabled=False), State.FAULTED, RigStopError, "switched the drives off"),
     "stale for long": (replace(GOOD, age=0.2), State.STOPPING, RigStopError, "200 ms"),
     "silent": (replace(GOOD, trouble="timeout", silence=0.11), State.STOPPING, DeviceError, "110 ms"),
-    "nonsense": (replace(GOOD, trouble="words swapped", permanent=True), State.STOPPING, DeviceError, "swapped"),
+    "nonsense": (replace(GOOD, trouble="words swapped", hopeless=True), State.STOPPING, DeviceError, "swapped"),
     "lag": (replace(GOOD, following=5001, laggard="c2"), State.STOPPING, RigStopError, "cable c2 is 5.00 mm"),
     "PLC sees lag": (status(following_error=True), State.STOPPING, RigStopError, "from its set-point"),
     "refused thrice": (
-        replace(status(reject="step, cable c1"), rejects=3), State.STOPPING, RigStopError, "step, cable c1"
+        replace(status(reject="step, cable c1"), refused=3), State.STOPPING, RigStopError, "step, cable c1"
     ),
 }  # fmt: skip
 
@@ -120,7 +120,7 @@ def test_every_fault_ends_every_moving_state_with_its_cause(name, state):
 DOUBTS = {
     "stale": replace(GOOD, age=0.05),
     "one lost answer": replace(GOOD, trouble="timeout", silence=0.06),
-    "one refusal": replace(status(reject="speed, cable c1"), rejects=1),
+    "one refusal": replace(status(reject="speed, cable c1"), refused=1),
 }
 
 
@@ -171,7 +171,7 @@ SIGHTS = st.builds(
         replace, st.just(WELL), estop=st.booleans(), enabled=st.booleans(), stopping=st.booleans()
     ),
     silence=st.sampled_from([0.0, 0.0, 0.06, 0.2]),
-    rejects=st.integers(0, 4),
+    refused=st.integers(0, 4),
 )
 
 

@@ -29,8 +29,8 @@ from tcrctl.signals import Array, Command, Measurement, Truth
 CYCLE: Final = 0.02
 #: A drive that moves less than this in a cycle stands still [um].
 STILL: Final = 20
-#: How long usable frames are waited for before arming is refused [s].
-FIRST_LOOK: Final = 1.0
+#: Before arming is refused, usable frames are waited for so many times longer than in a run.
+FIRST_LOOK: Final = 2.5
 #: A tick waits for a frame at most this many frame intervals, then goes on with what it knows.
 PATIENCE: Final = 1.5
 
@@ -54,6 +54,15 @@ class RigLimits:
     mapped: int
     nodes: int
     arm_timeout: float
+
+
+@dataclass(slots=True)
+class _Line:
+    """How the last call of one kind went: when the drives answered last, and what went wrong since."""
+
+    answered: float
+    trouble: str = ""
+    hopeless: bool = False
 
 
 class RigPlant:
@@ -86,7 +95,7 @@ class RigPlant:
         self.supervisor = Supervisor(limits.rules, session.report)
         self._points: SetPoints | None = None
         self._status: DriveStatus | None = None
-        self._answered, self._trouble, self._permanent, self._rejects = clock(), "", False, 0
+        self._reading, self._writing, self._refused = _Line(clock()), _Line(clock()), 0
         self._seen: Sighting | None = None
         self._usable_at = -np.inf
         self._clamped: dict[tuple[str, str], int] = {}
@@ -102,7 +111,7 @@ class RigPlant:
             RigStopError: If the supervisor ends the run.
             DeviceError: If a device is lost.
         """
-        if self._ask(self._drives.status):
+        if self._ask():
             self._count_refusals()
         measured = self._measurement(self._frame())
         self._supervise()
@@ -157,10 +166,11 @@ class RigPlant:
                 position = self.position()
                 self._check_within(position)
                 self._exchange(position, on)
-                if self._trouble and self._clock() - self._answered > self._limits.rules.silence:
-                    raise DeviceError(f"the drives do not answer: {self._trouble}")
-                status = self._status
-                if status is not None and status.enabled and status.acknowledged and not self._trouble:
+                sight = self._sight()
+                if sight.silence > self._limits.rules.silence:
+                    raise DeviceError(f"the drives do not answer: {sight.trouble}")
+                status = sight.status
+                if status is not None and status.enabled and status.acknowledged and not sight.trouble:
                     break
                 if self._clock() - begun > self._limits.arm_timeout:
                     why = (status.fault if status else "") or "they do not say why"
@@ -198,7 +208,7 @@ class RigPlant:
             DeviceError: If they never did.
         """
         if self._status is None:
-            raise DeviceError(f"the drives do not answer: {self._trouble}")
+            raise DeviceError(f"the drives do not answer: {self._reading.trouble or self._writing.trouble}")
         return self._status.position
 
     def look(self) -> Sight:
@@ -206,46 +216,53 @@ class RigPlant:
 
         A frame that has waited here for too long is no sign of bad cameras, so others get their chance.
         """
-        self._ask(self._drives.status)
-        end = self._clock() + FIRST_LOOK
+        self._ask()
+        end = self._clock() + FIRST_LOOK * self._limits.rules.stale_stop
         while True:
             self._measurement(self._frame())
             if self._sight().age < self._limits.rules.stale or self._clock() >= end:
                 return self._sight()
 
     def _come_to_rest(self) -> None:
+        """Let the PLC ramp down, and see the drives stand still from one cycle to the next."""
         self.supervisor.stop(self._clock(), "end of the run")
+        before: Micrometres | None = None
         while self.supervisor.state is State.STOPPING:
-            before = self.position()
-            self._exchange(before, self.supervisor.control)
-            moved = bool(np.any(np.abs(self.position() - before) > STILL))
+            self._exchange(self.position(), self.supervisor.control)
+            now = self.position()
+            moved = before is None or bool(np.any(np.abs(now - before) > STILL))
+            before = now
             if self.supervisor.rest(self._clock(), self._sight(), moved=moved) is State.STOPPING:
                 self._sleep(CYCLE)
 
     # --- devices ---
 
-    def _ask(self, question: Callable[[], DriveStatus]) -> bool:
-        """Whether the drives answered; what they said and what went wrong is kept."""
-        try:
-            self._status = question()
-        except DeviceError as error:
-            self._trouble, self._permanent = str(error), isinstance(error, UntrustworthyDeviceError)
-            return False
-        self._answered, self._trouble, self._permanent = self._clock(), "", False
-        return True
+    def _ask(self) -> bool:
+        """Whether the drives answered the question how they are; says nothing about taking commands."""
+        return self._called(self._reading, self._drives.status)
 
     def _exchange(self, target: Micrometres, control: DriveControl) -> bool:
-        """Whether the drives answered; a PLC answers before it looks at the set-points."""
-        return self._ask(lambda: self._drives.exchange(target, control))
+        """Whether the drives answered a command; a PLC answers before it looks at the set-points."""
+        return self._called(self._writing, lambda: self._drives.exchange(target, control))
+
+    def _called(self, line: _Line, call: Callable[[], DriveStatus]) -> bool:
+        try:
+            self._status = call()
+        except DeviceError as error:
+            line.trouble, line.hopeless = str(error), isinstance(error, UntrustworthyDeviceError)
+            return False
+        line.answered, line.trouble, line.hopeless = self._clock(), "", False
+        return True
 
     def _count_refusals(self) -> None:
-        """Take back set-points that the PLC has refused since the last write."""
+        """Take back set-points that the PLC has not taken since the last write."""
         points, status = self._points, self._status
         if points is None or status is None or not self.supervisor.control.follow:
             return
-        if status.reject:
+        refused = bool(status.reject) or not status.acknowledged
+        if refused:
             points.take_back()
-        self._rejects = self._rejects + 1 if status.reject else 0
+        self._refused = self._refused + 1 if refused else 0
 
     def _frame(self) -> Sighting | None:
         """The next frame if the cameras are much faster than the loop, else the newest."""
@@ -279,15 +296,16 @@ class RigPlant:
             error = np.abs(self._status.position - self._points.accepted)
             worst = int(np.argmax(error))
             following, laggard = int(error[worst]), self._limits.envelope.names[worst]
+        lines = (self._writing, self._reading)
         return Sight(
             age=now - self._usable_at,
             status=self._status,
-            silence=now - self._answered if self._trouble else 0.0,
-            trouble=self._trouble,
+            silence=max(now - line.answered if line.trouble else 0.0 for line in lines),
+            trouble=self._writing.trouble or self._reading.trouble,
             following=following,
             laggard=laggard,
-            permanent=self._permanent,
-            rejects=self._rejects,
+            hopeless=any(line.hopeless for line in lines),
+            refused=self._refused,
         )
 
     def _supervise(self) -> None:

@@ -29,6 +29,7 @@ in the PLC stops the drives. See docs/bench.md.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -108,8 +109,8 @@ class Sight:
         trouble: What the last failed exchange said; empty if it did not fail.
         following: Largest distance of a drive from its set-point now [um].
         laggard: Name of that cable.
-        permanent: The failed exchange says that waiting cannot help.
-        rejects: Set-points refused in a row.
+        hopeless: The failed exchange says that waiting cannot help.
+        refused: Set-points in a row that the PLC has not taken.
     """
 
     age: float
@@ -118,8 +119,8 @@ class Sight:
     trouble: str = ""
     following: int = 0
     laggard: str = ""
-    permanent: bool = False
-    rejects: int = 0
+    hopeless: bool = False
+    refused: int = 0
 
 
 class Supervisor:
@@ -224,7 +225,7 @@ class Supervisor:
         waited = now - self._stopping_since
         if fault := _fault(status, enabled=False):
             self._end(now, State.FAULTED, RigStopError(fault, hint=RESET_HINT))
-        elif status is not None and not status.stopping and not moved:
+        elif status is not None and not (status.stopping or status.enabled or moved):
             self._go(State.DISARMED, "info", f"standstill after {waited:.2f} s")
         elif waited > self._rules.standstill:
             why = sight.trouble if status is None else "the drives are still moving"
@@ -242,7 +243,7 @@ class Supervisor:
 
     def _reason_to_stop(self, sight: Sight) -> TcrctlError | None:
         rules, status = self._rules, sight.status
-        if sight.permanent or sight.silence >= rules.silence:
+        if sight.hopeless or sight.silence >= rules.silence:
             return DeviceError(
                 f"safety stop of the rig: the drives have not answered for {1e3 * sight.silence:.0f} ms: "
                 f"{sight.trouble}"
@@ -256,8 +257,8 @@ class Supervisor:
                 f"cable {sight.laggard} is {sight.following / 1e3:.2f} mm from its set-point, "
                 f"limit {rules.following / 1e3:.2f} mm"
             )
-        if sight.rejects >= rules.rejects and status is not None:
-            return RigStopError(f"the PLC refused {sight.rejects} set-points in a row: {status.reject}")
+        if sight.refused >= rules.rejects and status is not None:
+            return RigStopError(f"the PLC refused {sight.refused} set-points in a row: {_refusal(status)}")
         return None
 
     def _end(self, now: float, state: State, failure: TcrctlError) -> None:
@@ -293,9 +294,13 @@ def _doubt(sight: Sight, rules: Rules) -> str:
         return f"no answer of the drives: {sight.trouble}"
     if sight.age >= rules.stale:
         return f"no usable measurement for {1e3 * sight.age:.0f} ms"
-    if sight.rejects and sight.status is not None:
-        return f"the PLC refused a set-point: {sight.status.reject}"
+    if sight.refused and sight.status is not None:
+        return f"the PLC refused a set-point: {_refusal(sight.status)}"
     return ""
+
+
+def _refusal(status: DriveStatus) -> str:
+    return status.reject or "it was not acknowledged"
 
 
 def _refusals(sight: Sight, rules: Rules) -> list[str]:
@@ -311,6 +316,8 @@ def _refusals(sight: Sight, rules: Rules) -> list[str]:
         reasons.append("the PLC is not switched to remote")
     if not status.acknowledged:
         reasons.append("the PLC does not acknowledge")
-    if not sight.age < rules.stale:
+    if sight.age == math.inf:
+        reasons.append("the cameras have shown no usable measurement")
+    elif not sight.age < rules.stale:
         reasons.append(f"the newest usable measurement is {1e3 * sight.age:.0f} ms old")
     return reasons
