@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,6 +31,9 @@ def emulate(
     rate_hz: Annotated[
         float, typer.Option("--rate-hz", min=10, max=1000, help="Camera frames per second.")
     ] = 240.0,
+    watchdog_ms: Annotated[
+        int, typer.Option("--watchdog-ms", min=20, max=60000, help="Watchdog of the PLCs.")
+    ] = 200,
     for_s: Annotated[
         float | None, typer.Option("--for-s", min=0, help="End after this time; default: at Ctrl-C.")
     ] = None,
@@ -50,7 +54,7 @@ def emulate(
     from tcrctl.interruption import Interruption, signals_exit
 
     with signals_exit():
-        bench, script = _built(rig, faults, perfect, rate_hz)
+        bench, script = _built(rig, faults, perfect, rate_hz, watchdog_ms)
     from tcrctl.emulate.bench import emulate as keep_going
 
     with Interruption() as interruption, bench:
@@ -71,7 +75,7 @@ def emulate(
 
 
 def _built(
-    rig: str, faults: Path | None, perfect: bool, rate_hz: float
+    rig: str, faults: Path | None, perfect: bool, rate_hz: float, watchdog_ms: int
 ) -> tuple[EmulatedBench, FaultScript | None]:
     from tcrctl.compilation import announced_compilation
     from tcrctl.emulate.bench import EmulatedBench, EmulationSettings
@@ -80,9 +84,9 @@ def _built(
 
     file, *_ = read_rig(rig)
     script = None if faults is None else load_fault_script(faults)
-    settings = EmulationSettings(rate=rate_hz)
+    settings = EmulationSettings(rate=rate_hz, watchdog_ms=watchdog_ms)
     if perfect:
-        settings = EmulationSettings(mismatch=None, noise=1e-9, rate=rate_hz)
+        settings = replace(settings, mismatch=None, noise=1e-9)
     with announced_compilation(lambda: _say("compiling numerical kernels (first run only) ...")):
         return EmulatedBench(file, settings), script
 
