@@ -180,6 +180,24 @@ def test_changed_models_take_the_names_away_until_they_are_told_anew():
     assert session.model_updates == 2
 
 
+def test_names_that_change_twice_while_the_flag_is_up_are_asked_for_again_at_its_end():
+    session, server = Session(UNICAST, 0.0), Server((4, 1))
+    now = talk(session, server, 0.0)
+    session.receive(server.frame(now, params=2), now)
+    now = talk(session, server, now)
+    server.models = {"second": ["a"]}
+    session.receive(server.frame(now, params=2), now)
+    now = talk(session, server, now)
+    assert "second.a" not in session.models.labels()
+    session.receive(server.frame(now), now)
+    assert session.models is not None
+    now = talk(session, server, now)
+    assert "second.a" in session.models.labels()
+    asked = server.asked.count(REQUEST_MODELDEF)
+    talk(session, server, now)
+    assert server.asked.count(REQUEST_MODELDEF) == asked
+
+
 def test_a_restarted_server_is_a_new_session_with_new_names_and_a_new_clock():
     session, server = Session(UNICAST, 0.0), Server((4, 1))
     now = talk(session, server, 0.0)
@@ -205,10 +223,11 @@ def test_silence_makes_the_client_connect_again():
     assert connects + 2 <= server.asked.count(CONNECT) <= connects + 4
 
 
-def test_a_server_that_dropped_the_client_is_connected_at_once():
+@pytest.mark.parametrize("word", [DISCONNECT, BYTIMEOUT])
+def test_a_server_that_ended_the_connection_is_connected_at_once(word):
     session, server = Session(UNICAST, 0.0), Server((4, 1))
     now = talk(session, server, 0.0)
-    session.receive(wire.packet(BYTIMEOUT), now)
+    session.receive(wire.packet(word), now)
     connects = server.asked.count(CONNECT)
     now = talk(session, server, now, seconds=0.3)
     assert server.asked.count(CONNECT) == connects + 1
@@ -263,6 +282,18 @@ def test_an_echo_that_nobody_asked_for_does_not_set_the_clock():
         session.receive(wire.packet(ECHOED, struct.pack("<QQ", client_ns, 5)), now)
     assert session.clock.best is best
     assert session.clock.steps == 0
+
+
+@pytest.mark.parametrize("exposed_s_ago", [-0.01, -1e6, 11.0, 900.0])
+def test_a_frame_from_an_impossible_time_is_dated_by_its_arrival(exposed_s_ago):
+    """A wrong stamp must not make an old frame look fresh."""
+    session, server = Session(UNICAST, 0.0), Server((4, 1))
+    now = talk(session, server, 0.0)
+    ticks = round((now - exposed_s_ago + 1000.0) * HZ)
+    content = Wire(number=1, ticks=(max(ticks, 1), 5, 5))
+    frame = session.receive(wire.packet(FRAME, wire.frame_payload((4, 1), content)), now)
+    assert frame.exposure is None
+    assert frame.age(now) == 0.0
 
 
 def test_a_message_of_the_server_is_shown():

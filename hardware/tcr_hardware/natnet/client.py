@@ -13,7 +13,6 @@ import threading
 import time
 from types import TracebackType
 
-from tcr_hardware.errors import HardwareError
 from tcr_hardware.natnet import protocol
 from tcr_hardware.natnet.errors import RequestRefusedError, ServerSilentError
 from tcr_hardware.natnet.inbox import Inbox
@@ -72,7 +71,7 @@ class NatNetClient:
         self._receiver = Receiver(Sockets.open(self.settings), self._session, self._inbox, server)
         try:
             return self._await_server(server, timeout_s)
-        except HardwareError:
+        except BaseException:
             self.close()
             raise
 
@@ -96,6 +95,20 @@ class NatNetClient:
     def models(self) -> ModelDefinitions | None:
         """What the server tracks; None until told, and for a moment after a change."""
         return self._session.models
+
+    def wait_models(self, timeout_s: float = 1.0) -> ModelDefinitions:
+        """Return what the server tracks; wait if it is about to tell anew.
+
+        Raises:
+            ServerSilentError: It did not tell within ``timeout_s``.
+            HardwareError: Receiving has ended, for the reason given.
+        """
+        end = time.monotonic() + timeout_s
+        while (models := self._session.models) is None:
+            if not self._inbox.wait(lambda: self._session.models is not None, end - time.monotonic()):
+                raise ServerSilentError(self.settings.address, "model definitions", timeout_s)
+            self._inbox.check()
+        return models
 
     def newest(self) -> MarkerFrame | None:
         """Return the newest frame without waiting, or None before the first.

@@ -28,11 +28,11 @@ class UnsupportedVersionError(NatNetError):
 
     Attributes:
         version: Version of the server's stream, as text.
-        allowed: Versions that can be read, as text.
+        allowed: Versions that can be read or were asked for, as text.
     """
 
     def __init__(self, version: str, allowed: str, *, hint: str) -> None:
-        super().__init__(f"the server streams NatNet {version}; this client reads {allowed}", hint=hint)
+        super().__init__(f"the server streams NatNet {version}, wanted {allowed}", hint=hint)
         self.version, self.allowed = version, allowed
 
 

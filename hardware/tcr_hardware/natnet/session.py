@@ -29,6 +29,8 @@ from tcr_hardware.natnet.version_choice import VersionChoice
 #: So many packets in a row that cannot be read: ask the server anew who it is.
 MALFORMED_IN_A_ROW = 5
 RETRY_S = 0.25
+#: A frame that claims to be older than this has a wrong time stamp [s].
+LONGEST_LATENCY = 10.0
 #: Clock requests that may still be answered; older ones are given up.
 ECHOES = 4
 
@@ -61,7 +63,7 @@ class Session:
         self.on_response: Callable[[int, bytes], None] = lambda message, payload: None
         self._in_a_row = 0
         self._heard = now
-        self._models_changing = False
+        self._models_changing = self._refresh_models = False
         self._echoes: deque[int] = deque(maxlen=ECHOES)
         self._timers = Timers(
             now, connect=RETRY_S, bitstream=RETRY_S, models=RETRY_S, keep_alive=settings.keep_alive_s,
@@ -79,7 +81,10 @@ class Session:
         return self.version is not None and self.models is not None
 
     def receive(self, datagram: bytes, now: float) -> MarkerFrame | None:
-        """Take a datagram that arrived at ``now`` [s]; return a frame if it holds a new one. Never raises."""
+        """Take a datagram that arrived at ``now`` [s]; return a frame if it holds a new one.
+
+        A packet that cannot be read is counted in ``malformed``; ``failure`` tells of a server that cannot be used.
+        """
         try:
             message, payload = protocol.split(datagram)
             frame = self._handle(message, payload, now)
@@ -100,7 +105,8 @@ class Session:
             return wanted
         if self.choice.pending and self._timers.due("bitstream", now):
             wanted += [protocol.request(text) for text in self.choice.questions()]
-        if self.version is not None and self.models is None and self._timers.due("models", now):
+        outdated = self.models is None or self._refresh_models
+        if self.version is not None and outdated and self._timers.due("models", now):
             wanted.append(protocol.envelope(Message.REQUEST_MODELDEF))
         if not self.settings.multicast and self._timers.due("keep_alive", now):
             wanted.append(protocol.envelope(Message.KEEPALIVE))
@@ -121,25 +127,24 @@ class Session:
         if message == Message.FRAMEOFDATA:
             return self._frame(payload, now)
         if message == Message.SERVERINFO:
-            self._server_info(ServerInfo.decode(payload), now)
+            self._server_info(ServerInfo.decode(payload))
         elif message == Message.MODELDEF and self.version is not None:
-            self.models = decode_models(payload, self.version)
+            self.models, self._refresh_models = decode_models(payload, self.version), False
             self.model_updates += 1
         elif message == Message.ECHORESPONSE:
             self._echo(payload, now)
         elif message in (Message.RESPONSE, Message.UNRECOGNIZED_REQUEST):
             self._response(message, payload)
-        elif message == Message.DISCONNECTBYTIMEOUT:
-            self.last_problem, self.server = "the server dropped us for want of keep-alives", None
+        elif message in (Message.DISCONNECT, Message.DISCONNECTBYTIMEOUT):
+            self.last_problem, self.server = "the server ended the connection", None
         elif message == Message.MESSAGESTRING:
             self.last_problem = "server: " + payload.partition(b"\0")[0][:200].decode("utf-8", "replace")
         return None
 
-    def _server_info(self, info: ServerInfo, now: float) -> None:
+    def _server_info(self, info: ServerInfo) -> None:
         """The server introduced itself: for the first time, again, or as another one."""
         same, self.server = info == self.server, info
-        settling = self.choice.pending or self.choice.stream is not None
-        if same and settling and self._in_a_row < MALFORMED_IN_A_ROW:
+        if same and (self.choice.pending or self.choice.stream is not None):
             return
         self._in_a_row = 0
         self.choice.server_speaks(info.version)
@@ -157,9 +162,7 @@ class Session:
         arrival = self.order.classify(data.number, now, models_changed=data.has(MODELS_CHANGED))
         if arrival not in (Arrival.NEXT, Arrival.NEW_SESSION):
             return None
-        if arrival is Arrival.NEW_SESSION or (data.has(MODELS_CHANGED) and not self._models_changing):
-            self._forget_models()
-        self._models_changing = data.has(MODELS_CHANGED)
+        self._notice_models(arrival is Arrival.NEW_SESSION, data.has(MODELS_CHANGED))
         if data.has(BITSTREAM_CHANGED):
             self.choice.ask_again()
         if arrival is Arrival.NEW_SESSION:
@@ -167,6 +170,15 @@ class Session:
             self._timers.now_due("echo")
         self.frames += 1
         return self._on_our_clock(data, now)
+
+    def _notice_models(self, new_session: bool, flagged: bool) -> None:
+        """The flag may stay for many frames: its beginning counts, and its end, for what changed in between."""
+        if new_session or (flagged and not self._models_changing):
+            self._forget_models()
+        elif self._models_changing and not flagged:
+            self._refresh_models = True
+            self._timers.now_due("models")
+        self._models_changing = flagged
 
     def _forget_models(self) -> None:
         """Names may have changed: none is better than a wrong one."""
@@ -179,6 +191,10 @@ class Session:
         if latency is None and suffix.received and suffix.transmit and self.clock.hz:
             latency = (suffix.transmit - suffix.received) / self.clock.hz
         exposure = self.clock.local(suffix.mid_exposure)
+        if exposure is not None:
+            latest = now + (self.clock.uncertainty(now) or 0.0)
+            if not now - LONGEST_LATENCY < exposure <= latest:
+                exposure, self.last_problem = None, "a frame was exposed at an impossible time"
         return MarkerFrame(self.order.sessions, self.frames - 1, now, exposure, latency, data, self.models)
 
     def _echo(self, payload: bytes, now: float) -> None:

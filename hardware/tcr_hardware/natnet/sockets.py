@@ -10,7 +10,7 @@ from tcr_hardware.errors import SocketError
 from tcr_hardware.natnet.protocol import DATA_PORT, MULTICAST_GROUP, ServerInfo, connect
 from tcr_hardware.natnet.settings import NatNetSettings
 
-#: Holds half a second of large frames while Python is busy.
+#: Holds large frames while Python is busy; the system may allow less.
 RECEIVE_BUFFER = 1 << 20
 
 

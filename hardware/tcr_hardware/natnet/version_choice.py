@@ -102,7 +102,7 @@ class VersionChoice:
                 self.pending = False
                 raise self._refused(str(version))
             return
-        self.pending = False
+        self.pending, self._set_requests = False, 0
         self._settle(version)
 
     def _settle(self, version: Version) -> None:
