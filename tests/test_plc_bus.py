@@ -311,6 +311,19 @@ def test_a_plc_that_answers_without_running_is_found_out(bus, plc, fault, regist
     assert frozen.value.register == register
 
 
+def test_a_frozen_acknowledge_is_found_out_also_by_a_host_that_reads_in_between(bus, plc):
+    bus.exchange(STILL, Control.RUN, SPEED)
+    plc.faults.set("freeze_ack")
+
+    def watch():
+        for _ in range(200):
+            settle(bus, STILL, Control.RUN, exchanges=1)
+            bus.read_status()
+
+    with pytest.raises(PlcFrozenError, match="SEQ_ACK"):
+        watch()
+
+
 def test_refused_sets_are_reported_and_do_not_count_as_frozen(bus):
     settle(bus, STILL, ON, exchanges=3)
     for _ in range(40):

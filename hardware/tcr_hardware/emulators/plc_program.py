@@ -100,7 +100,7 @@ class PlcProgram:
         self.cycle = self.seq_ack = self.heartbeat_echo = 0
         self._seq_seen, self._silence_s, self._since_set_s = 0, 0.0, LONGEST_INTERVAL_S
         self._control = Control(0)
-        self.fault, self.watchdog, self.following_error = Fault.NONE, False, False
+        self.fault, self.watchdog, self.following_error, self._tripped = Fault.NONE, False, False, False
         self.enabled = self.stopping = self._following = self.limited = False
         self.reject = (Reject.NONE, 0)
         self.active = self.positions()
@@ -137,8 +137,11 @@ class PlcProgram:
         self.cycle = (self.cycle + 1) & 0xFFFF
         rising = command.control & ~self._control
         self._control = command.control
+        self._tripped = False
         self._watch(command, dt)
         self._find_faults()
+        if self._tripped:
+            self._stop()
         if Control.RESET in rising:
             self._reset()
         if Control.ZERO in rising:
@@ -175,10 +178,10 @@ class PlcProgram:
                 self._trip(Fault.FOLLOWING_ERROR)
 
     def _trip(self, fault: Fault) -> None:
-        """Latch a fault and stop; the first fault stays the one reported."""
+        """Latch a fault, which stops; the first fault stays the one reported."""
         if self.fault is Fault.NONE:
             self.fault = fault
-        self._stop()
+        self._tripped = True
 
     def _stop(self) -> None:
         """Bring the set-points to rest; they stay there."""

@@ -34,6 +34,8 @@ from tcr_hardware.modbus.wire_time import share_of_period
 from tcr_hardware.modbus.words import BYTE_ORDERS, WORD_ORDERS, WordCodec
 
 ILLEGAL_FUNCTION = 1
+#: How long an answer may take while the bus is opened and nothing moves [s].
+OPENING_S = 0.5
 #: A PLC that was restarted has seen the last write after this time [s]: one cycle of its program.
 SCAN_S = 0.01
 
@@ -96,18 +98,23 @@ class PlcBus:
             PlcMismatchError: It is not the PLC of this register map.
         """
         self._link.close()
-        self._link.open()
-        try:
-            codec = self._identify()
-            self._blocks, self._liveness = Blocks(self._map, codec), Liveness()
-            limits = self._blocks.limits(self._read("limits"))
-            self._counters = self._blocks.counters(self._read("command"))
-            status = self._status(self._read("status"), time.monotonic(), 1)
-        except Exception:
-            self._link.close()
-            raise
-        self._info = PlcInfo(MAP_VERSION, codec.word_order, codec.byte_order, limits, status)
+        with self._link.patience(OPENING_S):
+            self._link.open()
+            try:
+                self._info = self._find_out()
+            except BaseException:
+                self._link.close()
+                raise
         return self._info
+
+    def _find_out(self) -> PlcInfo:
+        """Read everything that a bus has to know of its PLC."""
+        codec = self._identify()
+        self._blocks, self._liveness = Blocks(self._map, codec), Liveness()
+        limits = self._blocks.limits(self._read("limits"))
+        self._counters = self._blocks.counters(self._read("command"))
+        status = self._status(self._read("status"), time.monotonic(), 1)
+        return PlcInfo(MAP_VERSION, codec.word_order, codec.byte_order, limits, status)
 
     def close(self) -> None:
         """Close the connection; sends nothing. Never raises."""

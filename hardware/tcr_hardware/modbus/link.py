@@ -12,8 +12,8 @@ import select
 import socket
 import struct
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException
@@ -52,7 +52,8 @@ class ModbusLink:
             timeout_s: How long one answer may take [s].
             probe_address: A register that can always be read, to settle a serial line.
         """
-        self._link, self._unit, self._timeout_s = link, unit, timeout_s
+        self._link, self._unit = link, unit
+        self._timeout_s = self._usual_timeout_s = timeout_s
         self._probe_address = probe_address
         self._client = _client(link, timeout_s)
         self._unsure = False  # an answer may still be under way on a serial line
@@ -88,6 +89,18 @@ class ModbusLink:
         """Close the connection; never raises."""
         with suppress(OSError):
             self._client.close()  # type: ignore[no-untyped-call]
+
+    @contextmanager
+    def patience(self, timeout_s: float) -> Iterator[None]:
+        """Wait longer for answers where nothing moves yet; never shorter than set."""
+        self._set_timeout(max(timeout_s, self._usual_timeout_s))
+        try:
+            yield
+        finally:
+            self._set_timeout(self._usual_timeout_s)
+
+    def _set_timeout(self, timeout_s: float) -> None:
+        self._timeout_s = self._client.comm_params.timeout_connect = timeout_s
 
     def distrust(self) -> None:
         """Settle a serial line before the next request."""

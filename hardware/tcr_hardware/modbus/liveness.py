@@ -40,10 +40,10 @@ class Liveness:
         self._follow("PLC_CYCLE", status.plc_cycle, status.t_s)
         if wrote:
             self._follow("HB_ECHO", status.heartbeat_echo, status.t_s)
-        if wrote and status.reject is Reject.NONE:
+        if status.reject is not Reject.NONE:
+            self._seen.pop("SEQ_ACK", None)  # it stands still for a reason that is told
+        elif wrote:
             self._follow("SEQ_ACK", status.seq_ack, status.t_s)
-        else:
-            self._seen.pop("SEQ_ACK", None)
 
     def _follow(self, register: str, value: int, now: float) -> None:
         last, repeated, since = self._seen.get(register, (value, -1, now))
