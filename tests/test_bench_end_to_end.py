@@ -240,9 +240,8 @@ def test_calibration_finds_where_the_cameras_are_and_keeps_the_file_as_it_is(rig
     assert "is shipped" in capsys.readouterr().err
 
 
-def test_a_rig_that_does_not_answer_is_exit_code_5_and_leaves_no_folder(tmp_path, capsys):
+def test_a_rig_that_does_not_answer_is_exit_code_5(tmp_path, capsys):
     path = tmp_path / "nobody.yaml"
     path.write_text(patient_rig())
-    assert answer(capsys, "rig", "status", str(path), "--robot", "tcr600")[0] == 5
     assert answer(capsys, "rig", "check", str(path), "--robot", "tcr600")[0] == 5
     assert answer(capsys, "rig", "check", str(path), "--dry-run")[0] == 0
