@@ -12,7 +12,7 @@ from tcrctl.plant.devices import DriveControl, DriveStatus, Sighting
 from tcrctl.plant.rig import RigLimits, RigPlant
 from tcrctl.plant.session import Session
 from tcrctl.plant.set_points import AntagonistGroup, DriveEnvelope
-from tcrctl.plant.supervisor import Rules
+from tcrctl.plant.sight import Rules
 from tcrctl.signals import RawFrame
 
 M, N = 3, 6

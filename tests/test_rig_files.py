@@ -8,7 +8,8 @@ import re
 import pytest
 
 from tcrctl import shipped, strict_yaml
-from tcrctl.cli.app import RIG_VERBS, main
+from tcrctl.cli.app import main
+from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.errors import InputError, SpecError, UnknownNameError
 from tcrctl.plant.rig_file import load_rig, read_rig
 from tcrctl.plant.rig_settings import RigFile

@@ -18,7 +18,7 @@ from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.recover import recover
-from tcrctl.cli.rig import RIG_VERBS
+from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show

@@ -12,7 +12,7 @@ from tcrctl.plant.rig_file import LoadedRig
 from tcrctl.plant.rig_settings import MountedRobot, SafetyRules
 from tcrctl.plant.session import Session
 from tcrctl.plant.set_points import AntagonistGroup, DriveEnvelope
-from tcrctl.plant.supervisor import Rules
+from tcrctl.plant.sight import Rules
 from tcrctl.robot.robot import Robot
 
 if TYPE_CHECKING:

@@ -18,11 +18,13 @@ from typing import Final
 
 import numpy as np
 
-from tcrctl.errors import ArmingRefusedError, DeviceError, TcrctlError, UntrustworthyDeviceError
-from tcrctl.plant.devices import Cameras, DriveControl, Drives, DriveStatus, Sighting
+from tcrctl.errors import ArmingRefusedError, DeviceError, TcrctlError
+from tcrctl.plant.devices import Cameras, DriveControl, Drives, Sighting
+from tcrctl.plant.drive_line import DriveLine
 from tcrctl.plant.session import Session
-from tcrctl.plant.set_points import Clamp, DriveEnvelope, Micrometres, SetPoints
-from tcrctl.plant.supervisor import Rules, Sight, State, Supervisor
+from tcrctl.plant.set_points import ClampNotes, DriveEnvelope, Micrometres, SetPoints
+from tcrctl.plant.sight import Rules, Sight
+from tcrctl.plant.supervisor import State, Supervisor
 from tcrctl.signals import Array, Command, Measurement, Truth
 
 #: How often the drives are written to while they are armed or stopped outside the control loop [s].
@@ -56,15 +58,6 @@ class RigLimits:
     arm_timeout: float
 
 
-@dataclass(slots=True)
-class _Line:
-    """How the last call of one kind went: when the drives answered last, and what went wrong since."""
-
-    answered: float
-    trouble: str = ""
-    hopeless: bool = False
-
-
 class RigPlant:
     """See the module's docstring."""
 
@@ -90,15 +83,14 @@ class RigPlant:
             clock: Never jumps; that of the camera frames [s].
             sleep: Waits for a time [s].
         """
-        self._cameras, self._drives, self._limits = cameras, drives, limits
+        self._cameras, self._line, self._limits = cameras, DriveLine(drives, clock), limits
         self._period, self._session, self._clock, self._sleep = period, session, clock, sleep
         self.supervisor = Supervisor(limits.rules, session.report)
         self._points: SetPoints | None = None
-        self._status: DriveStatus | None = None
-        self._reading, self._writing, self._refused = _Line(clock()), _Line(clock()), 0
+        self._refused = 0
         self._seen: Sighting | None = None
         self._usable_at = -np.inf
-        self._clamped: dict[tuple[str, str], int] = {}
+        self._clamps = ClampNotes(session.report)
 
     # --- the loop ---
 
@@ -111,7 +103,7 @@ class RigPlant:
             RigStopError: If the supervisor ends the run.
             DeviceError: If a device is lost.
         """
-        if self._ask():
+        if self._line.ask():
             self._count_refusals()
         measured = self._measurement(self._frame())
         self._supervise()
@@ -133,8 +125,8 @@ class RigPlant:
         before = points.accepted
         moving = self.supervisor.state is State.RUNNING
         target, clamps = points.propose(command.speed if moving else np.zeros_like(command.speed))
-        self._note_clamps(clamps)
-        if self._exchange(target, self.supervisor.control):
+        self._clamps.note(clamps)
+        if self._line.exchange(target, self.supervisor.control):
             points.accept()
         else:
             points.start_again()
@@ -164,8 +156,10 @@ class RigPlant:
         try:
             while True:
                 position = self.position()
-                self._check_within(position)
-                self._exchange(position, on)
+                if outside := self._limits.envelope.outside(position):
+                    hint = "Bring it inside with the PLC's own manual mode."
+                    raise ArmingRefusedError(outside, hint=hint)
+                self._line.exchange(position, on)
                 sight = self._sight()
                 if sight.silence > self._limits.rules.silence:
                     raise DeviceError(f"the drives do not answer: {sight.trouble}")
@@ -179,7 +173,7 @@ class RigPlant:
                     )
                 self._sleep(CYCLE)
         except TcrctlError:
-            self._exchange(self.position(), DriveControl())
+            self._line.exchange(self.position(), DriveControl())
             raise
         self._points = SetPoints(self._limits.envelope, self._period, self.position().tolist())
         self.supervisor.arm(cause)
@@ -194,10 +188,10 @@ class RigPlant:
         try:
             self._come_to_rest()
             if self._points is not None:
-                self._exchange(self.position(), DriveControl())
+                self._line.exchange(self.position(), DriveControl())
         finally:
             self._cameras.close()
-            self._drives.close()
+            self._line.close()
         if before is None and self.supervisor.failure is not None:
             raise self.supervisor.failure
 
@@ -207,16 +201,14 @@ class RigPlant:
         Raises:
             DeviceError: If they never did.
         """
-        if self._status is None:
-            raise DeviceError(f"the drives do not answer: {self._reading.trouble or self._writing.trouble}")
-        return self._status.position
+        return self._line.position()
 
     def look(self) -> Sight:
         """Ask cameras and drives and return what is known, without any consequence.
 
         A frame that has waited here for too long is no sign of bad cameras, so others get their chance.
         """
-        self._ask()
+        self._line.ask()
         end = self._clock() + FIRST_LOOK * self._limits.rules.stale_stop
         while True:
             self._measurement(self._frame())
@@ -228,7 +220,7 @@ class RigPlant:
         self.supervisor.stop(self._clock(), "end of the run")
         before: Micrometres | None = None
         while self.supervisor.state is State.STOPPING:
-            self._exchange(self.position(), self.supervisor.control)
+            self._line.exchange(self.position(), self.supervisor.control)
             now = self.position()
             moved = before is None or bool(np.any(np.abs(now - before) > STILL))
             before = now
@@ -237,26 +229,9 @@ class RigPlant:
 
     # --- devices ---
 
-    def _ask(self) -> bool:
-        """Whether the drives answered the question how they are; says nothing about taking commands."""
-        return self._called(self._reading, self._drives.status)
-
-    def _exchange(self, target: Micrometres, control: DriveControl) -> bool:
-        """Whether the drives answered a command; a PLC answers before it looks at the set-points."""
-        return self._called(self._writing, lambda: self._drives.exchange(target, control))
-
-    def _called(self, line: _Line, call: Callable[[], DriveStatus]) -> bool:
-        try:
-            self._status = call()
-        except DeviceError as error:
-            line.trouble, line.hopeless = str(error), isinstance(error, UntrustworthyDeviceError)
-            return False
-        line.answered, line.trouble, line.hopeless = self._clock(), "", False
-        return True
-
     def _count_refusals(self) -> None:
         """Take back set-points that the PLC has not taken since the last write."""
-        points, status = self._points, self._status
+        points, status = self._points, self._line.status
         if points is None or status is None or not self.supervisor.control.follow:
             return
         refused = bool(status.reject) or not status.acknowledged
@@ -271,7 +246,9 @@ class RigPlant:
 
     def _measurement(self, sighting: Sighting | None) -> Measurement:
         now, run_time = self._clock(), self._session.time()
-        drive = np.zeros(0) if self._status is None else np.asarray(1e-6 * self._status.position, float)
+        drive = (
+            np.zeros(0) if self._line.status is None else np.asarray(1e-6 * self._line.status.position, float)
+        )
         if sighting is None:
             return self._last_seen(run_time - now, drive)
         self._seen = sighting
@@ -292,19 +269,18 @@ class RigPlant:
 
     def _sight(self) -> Sight:
         now, following, laggard = self._clock(), 0, ""
-        if self._points is not None and self._status is not None:
-            error = np.abs(self._status.position - self._points.accepted)
+        if self._points is not None and self._line.status is not None:
+            error = np.abs(self._line.status.position - self._points.accepted)
             worst = int(np.argmax(error))
             following, laggard = int(error[worst]), self._limits.envelope.names[worst]
-        lines = (self._writing, self._reading)
         return Sight(
             age=now - self._usable_at,
-            status=self._status,
-            silence=max(now - line.answered if line.trouble else 0.0 for line in lines),
-            trouble=self._writing.trouble or self._reading.trouble,
+            status=self._line.status,
+            silence=self._line.silence(),
+            trouble=self._line.trouble,
             following=following,
             laggard=laggard,
-            hopeless=any(line.hopeless for line in lines),
+            hopeless=self._line.hopeless,
             refused=self._refused,
         )
 
@@ -312,25 +288,3 @@ class RigPlant:
         self.supervisor.watch(self._clock(), self._sight())
         if self.supervisor.failure is not None:
             raise self.supervisor.failure
-
-    def _check_within(self, position: Micrometres) -> None:
-        e = self._limits.envelope
-        outside = np.flatnonzero((position < e.low) | (position > e.high))
-        if outside.size:
-            reasons = [
-                f"cable {e.names[c]} is at {position[c] / 1e3:.2f} mm, outside its limits "
-                f"{e.low[c] / 1e3:g} to {e.high[c] / 1e3:g} mm"
-                for c in outside
-            ]
-            raise ArmingRefusedError(reasons, hint="Bring it inside with the PLC's own manual mode.")
-
-    def _note_clamps(self, clamps: tuple[Clamp, ...]) -> None:
-        """Report where clamping begins and ends; every step's wanted and sent values are in its record."""
-        now = {(clamp.cable, clamp.rule): clamp for clamp in clamps}
-        for key in [key for key in self._clamped if key not in now]:
-            steps = self._clamped.pop(key)
-            self._session.report("clamp", "info", f"cable {key[0]}: {key[1]}: over after {steps} steps")
-        for key, clamp in now.items():
-            if key not in self._clamped:
-                self._session.report("clamp", "warning", str(clamp))
-            self._clamped[key] = self._clamped.get(key, 0) + 1

@@ -9,7 +9,7 @@ that are sent: whatever the controller asks, a set-point is inside the stroke an
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +56,14 @@ class DriveEnvelope:
     speed: Array
     acceleration: Array
     groups: tuple[AntagonistGroup, ...] = ()
+
+    def outside(self, position: Micrometres) -> list[str]:
+        """Say which drives at ``position`` (m,) [um] are beyond their stroke."""
+        return [
+            f"cable {self.names[c]} is at {position[c] / 1e3:.2f} mm, outside its limits "
+            f"{self.low[c] / 1e3:g} to {self.high[c] / 1e3:g} mm"
+            for c in np.flatnonzero((position < self.low) | (position > self.high))
+        ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,3 +183,23 @@ class SetPoints:
             for c in np.flatnonzero(wanted != sent):
                 name = self._envelope.names[c]
                 clamps.append(Clamp(name, rule, float(wanted[c]) / scale, float(sent[c]) / scale, unit))
+
+
+class ClampNotes:
+    """Reports where clamping begins and ends; every step's wanted and sent values are in its record."""
+
+    def __init__(self, report: Callable[[str, str, str], None]) -> None:
+        """Begin without clamps; ``report`` takes kind, level and text."""
+        self._report = report
+        self._steps: dict[tuple[str, str], int] = {}
+
+    def note(self, clamps: tuple[Clamp, ...]) -> None:
+        """Take the clamps of one step."""
+        now = {(clamp.cable, clamp.rule): clamp for clamp in clamps}
+        for cable, rule in [key for key in self._steps if key not in now]:
+            steps = self._steps.pop((cable, rule))
+            self._report("clamp", "info", f"cable {cable}: {rule}: over after {steps} steps")
+        for key, clamp in now.items():
+            if key not in self._steps:
+                self._report("clamp", "warning", str(clamp))
+            self._steps[key] = self._steps.get(key, 0) + 1
