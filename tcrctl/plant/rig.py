@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from tcrctl.errors import ArmingRefusedError, DeviceError, TcrctlError
+from tcrctl.errors import ArmingRefusedError, DeviceError
 from tcrctl.plant.devices import Cameras, DriveControl, Drives, Sighting
 from tcrctl.plant.drive_line import DriveLine
 from tcrctl.plant.session import Session
@@ -123,8 +123,11 @@ class RigPlant:
             raise ArmingRefusedError(["the rig was never started"])
         self.supervisor.run()
         before = points.accepted
-        moving = self.supervisor.state is State.RUNNING
-        target, clamps = points.propose(command.speed if moving else np.zeros_like(command.speed))
+        if self.supervisor.state is State.RUNNING:
+            target, clamps = points.propose(command.speed)
+        else:
+            points.start_again()
+            target, clamps = points.propose(np.zeros_like(command.speed))
         self._clamps.note(clamps)
         if self._line.exchange(target, self.supervisor.control):
             points.accept()
@@ -172,7 +175,7 @@ class RigPlant:
                         [f"the drives are not on after {self._limits.arm_timeout:g} s: {why}"]
                     )
                 self._sleep(CYCLE)
-        except TcrctlError:
+        except BaseException:
             self._line.exchange(self.position(), DriveControl())
             raise
         self._points = SetPoints(self._limits.envelope, self._period, self.position().tolist())
