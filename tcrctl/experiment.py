@@ -20,7 +20,7 @@ from tcrctl.loop import run_loop, step_count
 from tcrctl.metrics import Metrics
 from tcrctl.pacing import Unpaced
 from tcrctl.plant.bench import build_rig
-from tcrctl.plant.plant import Plant
+from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.session import Session
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
@@ -39,7 +39,7 @@ START_READS: Final = 10
 WARM_UP_STEPS: Final = 3
 
 Notify = Callable[[str], None]
-PlantBuilder = Callable[["Experiment", Session], tuple[Plant, State | None]]
+PlantBuilder = Callable[["Experiment", Session], tuple[RunnablePlant, State | None]]
 
 
 def silent(text: str) -> None:
@@ -97,13 +97,13 @@ class Parts:
     """
 
     trajectory: Trajectory
-    plant: Plant
+    plant: RunnablePlant
     estimator: Estimator
     controller: Controller
     start_offset: float
 
 
-def _simulated(experiment: Experiment, session: Session) -> tuple[Plant, State]:
+def _simulated(experiment: Experiment, session: Session) -> tuple[RunnablePlant, State]:
     del session
     spec = experiment.spec
     if not isinstance(spec.plant, SimulatedSettings):
@@ -112,7 +112,7 @@ def _simulated(experiment: Experiment, session: Session) -> tuple[Plant, State]:
     return plant, plant.state
 
 
-def _rig(experiment: Experiment, session: Session) -> tuple[Plant, None]:
+def _rig(experiment: Experiment, session: Session) -> tuple[RunnablePlant, None]:
     if experiment.loaded.rig is None:
         raise InputError("the experiment was loaded without a rig file")
     return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, session), None
@@ -168,7 +168,7 @@ def plan(experiment: Experiment) -> StaticPath:
     return check_feasibility(experiment.trajectory, robot, limits)
 
 
-def build_plant(experiment: Experiment, session: Session | None = None) -> tuple[Plant, State | None]:
+def build_plant(experiment: Experiment, session: Session | None = None) -> tuple[RunnablePlant, State | None]:
     """Build the plant; returns its true state too if it knows it.
 
     Args:
@@ -182,7 +182,7 @@ def build_plant(experiment: Experiment, session: Session | None = None) -> tuple
     return PLANTS[experiment.spec.plant.kind](experiment, session or Session())
 
 
-def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> Parts:
+def build_parts(experiment: Experiment, plant: RunnablePlant, state: State | None) -> Parts:
     """Build estimator and controller for a plant at rest, and let the trajectory begin where the plant is.
 
     Args:

@@ -9,6 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJson
 from pydantic_core import PydanticCustomError, core_schema
 
 T = TypeVar("T")
+NotNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
+Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
+Vector: TypeAlias = tuple[float, float, float]
 Path: TypeAlias = tuple[str | int, ...]
 """Keys and list indices from the top of a document to one of its values."""
 

@@ -19,7 +19,7 @@ from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
 from tcrctl.kind_switch import without_former_keys
 from tcrctl.plant.rig_file import LoadedRig, load_rig
-from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings
+from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings, rings_named
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
 from tcrctl.settings import Path as Keys
@@ -104,28 +104,37 @@ def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Key
         spec: The experiment.
         robot: Its robot.
     """
-    plant, count = spec.plant, robot.modules.count
-    rings = plant.measured_rings if isinstance(plant, SimulatedSettings) else "all"
-    for i, ring in enumerate(() if rings == "all" else rings):
+    count = robot.modules.count
+    for keys, ring in rings_named(spec.plant):
         if ring > count:
-            yield (
-                ("plant", "measured_rings", i),
-                f"there is no ring {ring}; {robot.name} has rings 1 to {count}",
-            )
-    yield from _drive_misfits(spec.trajectory, robot)
+            yield ("plant", *keys), f"there is no ring {ring}; {robot.name} has rings 1 to {count}"
+    yield from _drive_misfits(spec, robot)
     tension = spec.controller.tension if isinstance(spec.controller, IocSettings) else None
     if tension is not None and tension.ceiling_n > robot.tension_limit_n:
         limit = f"tension_limit_n of {robot.name}, {robot.tension_limit_n:g}"
         yield ("controller", "tension", "ceiling_n"), f"must be at most {limit}, not {tension.ceiling_n:g}"
 
 
-def _drive_misfits(trajectory: TrajectorySettings, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
-    legs = trajectory.legs if isinstance(trajectory, DrivesSettings) else ()
+def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+    legs = spec.trajectory.legs if isinstance(spec.trajectory, DrivesSettings) else ()
+    given: list[tuple[Keys, tuple[float, ...]]] = [
+        (("trajectory", "legs", i, "drives_mm"), leg.drives_mm) for i, leg in enumerate(legs)
+    ]
+    start = spec.plant.start_drives_mm if isinstance(spec.plant, SimulatedSettings) else None
+    if start is not None:
+        given.append((("plant", "start_drives_mm"), start))
     names = [route.name for route in cable_routes(robot)]
-    for i, leg in enumerate(legs):
-        if len(leg.drives_mm) != len(names):
+    for keys, lengths in given:
+        if len(lengths) != len(names):
             has = f"{robot.name} has {len(names)} cables, {', '.join(names)}"
-            yield ("trajectory", "legs", i, "drives_mm"), f"{has}; there are {len(leg.drives_mm)} lengths"
+            yield keys, f"{has}; there are {len(lengths)} lengths"
+    low, high = robot.stroke_mm
+    for c, length in enumerate(start or ()):
+        if not low <= length <= high:
+            yield (
+                ("plant", "start_drives_mm", c),
+                f"must be within stroke_mm, {low:g} to {high:g}, not {length:g}",
+            )
 
 
 @dataclass(frozen=True, slots=True)

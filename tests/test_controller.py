@@ -143,7 +143,8 @@ def test_same_inputs_give_the_same_bytes(tcr700):
 
 
 def test_it_goes_to_the_target_and_stays(tcr600):
-    errors, _, infos = closed_loop(tcr600, ioc(), (0.02, 0.0, 0.04), 8.0)
+    settings = ioc(weights=CostWeights(speed_change=220.0))  # as for the letters
+    errors, _, infos = closed_loop(tcr600, settings, (0.02, 0.0, 0.04), 10.0)
     assert all(info.converged for info in infos)
     assert errors[-20:].max() < 1e-4
 

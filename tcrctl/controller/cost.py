@@ -12,17 +12,29 @@ from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Estimate, Reference
 
 
-def make_weights(settings: IocSettings, m: int) -> Weights:
-    """Weights of (30) for ``m`` cables; position-only tracking has no weight on normal and twist."""
+def make_weights(settings: IocSettings, m: int, instants: int) -> Weights:
+    """Weights of (30) for ``m`` cables; position-only tracking has no weight on normal and twist.
+
+    The output weights are shared out over the prediction ``instants``, so that the cost is their mean and R and W
+    mean the same whatever their number. W is what keeps the loop stable when the plant's slow modes are faster
+    or slower than the model's; a sum over the instants would weaken it as many times.
+    """
     w, tension = settings.weights, settings.tension
     output = np.zeros(POSE_ROWS + m)
     output[:3] = w.position
     if settings.output == "pose":
         output[3:6], output[6] = w.normal, w.twist
     if tension is None:
-        return Weights(output, w.speed, w.speed_change, -np.inf, np.inf, 1.0)
+        return Weights(output / instants, w.speed, w.speed_change, -np.inf, np.inf, 1.0)
     output[POSE_ROWS:] = tension.weight
-    return Weights(output, w.speed, w.speed_change, tension.floor_n, tension.ceiling_n, tension.softness)
+    return Weights(
+        output / instants,
+        w.speed,
+        w.speed_change,
+        tension.floor_n,
+        tension.ceiling_n,
+        instants * tension.softness,
+    )
 
 
 def make_target(settings: IocSettings, reference: Reference, shift: Array, m: int) -> Array:

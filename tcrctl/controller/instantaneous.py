@@ -44,7 +44,7 @@ class InstantaneousOptimalControl:
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
         self._settings, self._robot = settings, robot
         self._predictor = PREDICTORS[settings.prediction](settings, robot)
-        self._weights = make_weights(settings, robot.n_cables)
+        self._weights = make_weights(settings, robot.n_cables, self._predictor.ahead.size)
         self._integral = IntegralAction(settings.integral, settings.period_s)
         self._speed = np.zeros(robot.n_cables)
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)

@@ -2,7 +2,7 @@
 
 The prediction is affine in the inputs U (all blocks of all drives): Y = Y_0 + S U, in the place of (31). Then
 
-    J/2 = 1/2 Σ_n |Y_n - Y_d,n|²_Q + 1/2 Σ_b (|u_b|²_R + |u_b - u_{b-1}|²_W) = 1/2 U'H U + g'U + const
+    J/2 = 1/2 Σ_n |Y_n - Y_d,n|²_(Q/n) + 1/2 Σ_b (|u_b|²_R + |u_b - u_{b-1}|²_W) = 1/2 U'H U + g'U + const
 
 with rows A U >= b: hard ones for the speed and stroke limits, soft ones (quadratic slack with compliance D) for
 the tension floor and ceiling. The KKT conditions are the LCP

@@ -36,7 +36,7 @@ class LiteralIoc:
 
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
         self._settings, self._robot = settings, robot
-        self._weights = make_weights(settings, robot.n_cables)
+        self._weights = make_weights(settings, robot.n_cables, 1)
         self._integral = IntegralAction(settings.integral, settings.period_s)
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._gain = np.zeros((self._work.r.shape[0], robot.n_cables))

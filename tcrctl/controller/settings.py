@@ -56,7 +56,7 @@ class IntegralSettings(Settings):
 class OffsetSettings(Settings):
     """Estimates where the robot would come to rest, as opposed to where the model would."""
 
-    filter_s: float = quantity("s", "time constant of the estimate", 0.5, gt=0)
+    filter_s: float = quantity("s", "time constant of the estimate", 0.3, gt=0)
 
 
 class IocSettings(Settings):

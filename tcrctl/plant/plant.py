@@ -10,15 +10,6 @@ from tcrctl.signals import Command, Measurement, Truth
 class Plant(Protocol):
     """A robot that can be measured and driven."""
 
-    def start(self) -> None:
-        """Get ready to be driven: a rig arms its drives, a simulation has nothing to do.
-
-        Raises:
-            StoppedError: If it must not be driven now.
-            DeviceError: If it cannot.
-        """
-        ...
-
     def read(self) -> Measurement:
         """The newest measurement."""
         ...
@@ -33,4 +24,17 @@ class Plant(Protocol):
 
     def close(self) -> None:
         """Leave the robot in a safe state."""
+        ...
+
+
+class RunnablePlant(Plant, Protocol):
+    """A plant of a run: what is not recorded has to be got ready."""
+
+    def start(self) -> None:
+        """Get ready to be driven: a rig arms its drives, a simulation has nothing to do.
+
+        Raises:
+            StoppedError: If it must not be driven now.
+            DeviceError: If it cannot.
+        """
         ...

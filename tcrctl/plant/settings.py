@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from tcrctl.settings import OrOff, Settings, quantity
+from tcrctl.settings import NotNegative, OrOff, Path, Positive, Settings, Vector, quantity
 
 
 class Mismatch(Settings):
@@ -37,11 +38,29 @@ def _rings_tag(value: Any) -> str:
 
 
 Ring: TypeAlias = Annotated[int, Field(ge=1)]
+RingList: TypeAlias = Annotated[tuple[Ring, ...], Field(min_length=1), AfterValidator(_different)]
 Rings: TypeAlias = Annotated[
     Annotated[Literal["all"], BeforeValidator(_must_be_all), Tag("(all)")]
-    | Annotated[tuple[Ring, ...], Field(min_length=1), AfterValidator(_different), Tag("(list)")],
+    | Annotated[RingList, Tag("(list)")],
     Discriminator(_rings_tag),
 ]
+
+
+class PushSettings(Settings):
+    """A force on a ring for a while, spread evenly over its nodes; it begins and ends between control steps."""
+
+    ring: Ring = Field(description="ring that is pushed")
+    force_n: Vector = quantity("N", "force, world frame")
+    start_s: NotNegative = quantity("s", "time at which it begins")
+    duration_s: Positive = quantity("s", "how long it lasts")
+
+
+class DropoutSettings(Settings):
+    """Rings whose markers are not seen for a while."""
+
+    rings: RingList = Field(description="rings that are not seen")
+    start_s: NotNegative = quantity("s", "time at which it begins")
+    duration_s: Positive = quantity("s", "how long it lasts")
 
 
 class SimulatedSettings(Settings):
@@ -58,6 +77,12 @@ class SimulatedSettings(Settings):
     noise_um: float = quantity("um", "standard deviation of every measured coordinate", 0.0, ge=0)
     latency_ms: float = quantity("ms", "age of a measurement when it is read", 0.0, ge=0, le=1000)
     measured_rings: Rings = Field(default="all", description="rings whose three nodes carry markers")
+    tip_load_g: float = quantity("g", "mass that the tip ring carries and the model does not know", 0.0, ge=0)
+    start_drives_mm: tuple[float, ...] | None = quantity(
+        "mm", "drive lengths at which the robot rests before the run, one per cable; zeros if left out", None
+    )
+    pushes: tuple[PushSettings, ...] = Field(default=(), description="forces from outside")
+    dropouts: tuple[DropoutSettings, ...] = Field(default=(), description="markers that are not seen")
 
 
 class RigSettings(Settings):
@@ -71,3 +96,17 @@ PlantSettings: TypeAlias = Annotated[
     SimulatedSettings | RigSettings, Field(discriminator="kind", description="what is controlled")
 ]
 """Union of all kinds of plant, told apart by ``kind``."""
+
+
+def rings_named(settings: PlantSettings) -> Iterator[tuple[Path, int]]:
+    """Yield path within the section and number of every ring that the settings name."""
+    if not isinstance(settings, SimulatedSettings):
+        return
+    if settings.measured_rings != "all":
+        for i, ring in enumerate(settings.measured_rings):
+            yield ("measured_rings", i), ring
+    for i, push in enumerate(settings.pushes):
+        yield ("pushes", i, "ring"), push.ring
+    for i, dropout in enumerate(settings.dropouts):
+        for j, ring in enumerate(dropout.rings):
+            yield ("dropouts", i, "rings", j), ring

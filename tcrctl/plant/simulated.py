@@ -7,12 +7,36 @@ from collections import deque
 import numpy as np
 
 from tcrctl.errors import DivergenceError
-from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plant.disturbances import pushed, seen
+from tcrctl.plant.settings import Mismatch, SimulatedSettings
 from tcrctl.robot import dynamics, pose
 from tcrctl.robot.equations import make_workspace
+from tcrctl.robot.equilibrium import Equilibrium, equilibrium
 from tcrctl.robot.model import FIXED, ring_rows
 from tcrctl.robot.robot import Robot, mismatched
 from tcrctl.signals import Array, Command, Measurement, Truth
+
+
+def _moving(settings: SimulatedSettings, robot: Robot) -> Robot:
+    """Return the robot that moves: not quite the one the controller knows."""
+    if settings.mismatch is None and not settings.tip_load_g:
+        return robot
+    factors = settings.mismatch or Mismatch()
+    return mismatched(
+        robot,
+        factors.springs_youngs_modulus,
+        factors.cables_youngs_modulus,
+        factors.density,
+        settings.tip_load_g / 1000.0,
+    )
+
+
+def _start(settings: SimulatedSettings, robot: Robot) -> tuple[Array, Equilibrium]:
+    """Drives (m,) [m] and shape in which the robot rests before the run."""
+    if settings.start_drives_mm is None:
+        return np.zeros(robot.n_cables), robot.rest
+    drive = np.array(settings.start_drives_mm) / 1000.0
+    return drive, equilibrium(robot.model, drive, robot.weight, robot.rest.q)
 
 
 class SimulatedPlant:
@@ -24,23 +48,22 @@ class SimulatedPlant:
     """
 
     def __init__(self, settings: SimulatedSettings, robot: Robot, period: float, seed: int) -> None:
-        factors = settings.mismatch
-        if factors is not None:
-            robot = mismatched(
-                robot, factors.springs_youngs_modulus, factors.cables_youngs_modulus, factors.density
-            )
-        self.robot, self.period, self.time = robot, period, 0.0
+        robot = self.robot = _moving(settings, robot)
+        self.period, self.time = period, 0.0
+        self._pushes, self._dropouts = settings.pushes, settings.dropouts
         self._step, self._rho = settings.step_ms / 1000.0, settings.spectral_radius
         self._latency, self._noise = settings.latency_ms / 1000.0, settings.noise_um * 1e-6
         whole = int(self._latency / period + 1e-9)  # periods; what is left of the latency is within one
         self._late = max(0.0, self._latency - whole * period)
         self._random = np.random.default_rng(seed)
-        self._state = dynamics.rest_state(robot.rest.q, np.zeros(robot.n_cables))
+        drive, rest = _start(settings, robot)
+        self._state = dynamics.rest_state(rest.q, drive)
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
-        self._work.tension[:] = robot.rest.tension
+        self._work.tension[:] = rest.tension
         self._rows = np.array(ring_rows(robot.n_modules))
+        self._rings = self._rows // FIXED
         rings = range(1, robot.n_modules + 1) if settings.measured_rings == "all" else settings.measured_rings
-        self._valid = np.isin(self._rows // FIXED, list(rings))
+        self._valid = np.isin(self._rings, list(rings))
         self._seen = deque(
             [self._state.q.copy()], maxlen=whole + 1
         )  # oldest first: shapes as cameras saw them
@@ -52,10 +75,11 @@ class SimulatedPlant:
         """Ring nodes as they were one latency ago, with noise, in single precision; drives as they are."""
         nodes = self._seen[0].reshape(-1, 3)[self._rows]
         nodes = nodes + self._noise * self._random.standard_normal(nodes.shape)
+        t = self.time - min(self._latency, self.time)
         return Measurement(
-            t=self.time - min(self._latency, self.time),
+            t=t,
             nodes=nodes.astype(np.float32),
-            valid=self._valid.copy(),
+            valid=seen(self._valid, self._rings, self._dropouts, t),
             drive=self._state.drive.copy(),
         )
 
@@ -69,17 +93,18 @@ class SimulatedPlant:
         before = self._state.drive
         drive = np.clip(before + self.period * command.speed, low, high)
         applied = Command((drive - before) / self.period, drive)
-        self._advance(applied.speed, self.period - self._late)
+        force = pushed(self.robot.weight, self._pushes, self.time)
+        self._advance(applied.speed, self.period - self._late, force)
         self._seen.append(self._state.q.copy())
-        self._advance(applied.speed, self._late)
+        self._advance(applied.speed, self._late, force)
         self.time += self.period
         self._state.drive[:] = drive  # the sum of many sub-steps differs from it by rounding
         return applied
 
-    def _advance(self, speed: Array, duration: float) -> None:
+    def _advance(self, speed: Array, duration: float, force: Array) -> None:
         converged, residual, smallest, _ = dynamics.advance(
-            self.robot.model, self._state, speed, duration, self._step, self._rho, self.robot.weight,
-            self._work, self._scratch,
+            self.robot.model, self._state, speed, duration, self._step, self._rho, force, self._work,
+            self._scratch,
         )  # fmt: skip
         if not converged:
             raise DivergenceError(self.time, residual, smallest)

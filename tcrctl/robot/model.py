@@ -188,3 +188,11 @@ def scaled(model: Model, springs: float = 1.0, cables: float = 1.0, density: flo
     bars[RIGID_BARS * model.mass.shape[0] :, bar.STIFFNESS] *= springs
     strings[:, sliding_cable.STIFFNESS] *= cables
     return freeze(model._replace(bars=bars, cables=strings, mass=density * model.mass))
+
+
+def with_load(model: Model, ring: int, mass: float) -> Model:
+    """Twin of ``model`` whose ring with first node row ``ring`` carries ``mass`` [kg], a third on each node."""
+    blocks = model.mass.copy()
+    load = blocks[ring // FIXED - 1]
+    load[np.arange(3 * APEX), np.arange(3 * APEX)] += mass / 3.0
+    return freeze(model._replace(mass=blocks))

@@ -15,7 +15,7 @@ from tcrctl.robot.equilibrium import (
     equilibrium_with_tensions,
     with_rest_lengths,
 )
-from tcrctl.robot.model import FIXED, Model, build_model, gravity_force, scaled, undeformed
+from tcrctl.robot.model import FIXED, Model, build_model, gravity_force, scaled, undeformed, with_load
 from tcrctl.signals import Array
 
 
@@ -107,13 +107,23 @@ def build_robot(description: RobotDescription) -> Robot:
     )
 
 
-def mismatched(robot: Robot, springs: float = 1.0, cables: float = 1.0, density: float = 1.0) -> Robot:
+def mismatched(
+    robot: Robot, springs: float = 1.0, cables: float = 1.0, density: float = 1.0, tip_load: float = 0.0
+) -> Robot:
     """The same robot of other material: factors on moduli and masses, same rest lengths, own rest shape.
+
+    Args:
+        robot: The robot as described.
+        springs: Factor on the springs' Young's modulus.
+        cables: Factor on the cables' Young's modulus.
+        density: Factor on all masses.
+        tip_load: Mass carried by the tip ring, spread evenly over its nodes [kg].
 
     Raises:
         NoEquilibriumError: If that robot has no stable shape at zero drive.
     """
-    model = scaled(robot.model, springs, cables, density)
-    weight = density * robot.weight
+    gravity = np.linalg.solve(robot.model.mass[0], robot.weight[3 * FIXED : 6 * FIXED])[:3]
+    model = with_load(scaled(robot.model, springs, cables, density), robot.tip, tip_load)
+    weight = gravity_force(model, gravity)
     rest = equilibrium(model, np.zeros(robot.n_cables), weight, robot.rest.q)
     return replace(robot, model=model, weight=weight, rest=rest)

@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, TypeAlias, TypeVar
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator
 
-Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
-NotNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
-Vector: TypeAlias = tuple[float, float, float]
+from ..settings import NotNegative as NotNegative
+from ..settings import Positive as Positive
+from ..settings import Vector as Vector
+
 _Item = TypeVar("_Item")
 
 DIRECTION_TOLERANCE = 1e-3  # directions typed with four decimals pass; the builders make them exactly unit
