@@ -11,7 +11,7 @@ from natnet_wire import Wire
 from scipy.spatial.transform import Rotation
 
 from tcr_hardware.calibration import CalibrationError, average, calibrate
-from tcr_hardware.markers import Gate, MarkerMap, MarkerMapError, NodeMarker
+from tcr_hardware.markers import Gate, MarkerMap, MarkerMapError, NodeMarker, SharedMarkerError
 from tcr_hardware.natnet.frame_decoder import decode_frame
 from tcr_hardware.natnet.marker_frame import MarkerFrame
 from tcr_hardware.natnet.model_decoder import decode_models
@@ -182,6 +182,23 @@ def test_unknown_labels_are_all_named_with_what_there_is():
 def test_half_an_identity_is_refused(half):
     with pytest.raises(ValueError, match="give a label, or asset and member"):
         NodeMarker("m1.n1", **half)
+
+
+def test_two_nodes_with_one_marker_are_refused():
+    twice = [NodeMarker("m1.n1", label="a.b"), NodeMarker("m1.n2"), NodeMarker("m2.n1", label="a.b")]
+    with pytest.raises(SharedMarkerError, match=r"m1\.n1 and m2\.n1 .* a\.b"):
+        MarkerMap(twice, REST[:3])
+    MarkerMap([NodeMarker("m1.n1"), NodeMarker("m1.n2")], REST[:2])
+
+
+@pytest.mark.parametrize("gate", [Gate(np.inf, np.inf, np.inf), Gate(0.01, 0.0, 0.02)])
+def test_a_gate_may_be_open_or_not_grow_at_all(gate):
+    for nodes, named in ((LABELLED, True), (PLAIN, False)):
+        markers = MarkerMap(nodes, REST, gate=gate)
+        assert markers.locate(frame(REST, 0.0, named=named)).valid.all()
+        assert markers.locate(frame(REST, 0.0, named=named)).valid.all()
+        far = markers.locate(frame(shifted(0.0, 0.0, 0.022), 1.0, named=named))
+        assert far.valid.all() == np.isinf(gate.largest_m)
 
 
 # ---- transform and calibration ----

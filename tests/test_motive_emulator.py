@@ -122,16 +122,17 @@ def test_an_error_of_the_scene_is_raised_when_the_server_is_stopped():
     shown = iter([POSITIONS])
     motive = MotiveEmulator(NAMES, lambda: next(shown), MotiveSettings(command_port=0, rate_hz=1000.0))
     motive.start()
-    eventually(lambda: motive._failure is not None)
+    eventually(lambda: motive.failure is not None)
     with pytest.raises(StopIteration):
         motive.stop()
 
 
-def test_names_and_positions_must_fit():
+def test_what_cannot_be_served_is_refused():
     with pytest.raises(ValueError, match="8 names, but positions of shape"):
         MotiveEmulator(NAMES, lambda: POSITIONS[:5], MotiveSettings(command_port=0))
-    with pytest.raises(ValueError, match="unicast_to"):
-        serve(unicast_to="nobody")
+    for wrong in ({"unicast_to": "nobody"}, {"version": "four"}, {"rate_hz": 0.0}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            serve(**wrong)
 
 
 # ---- the scene ----

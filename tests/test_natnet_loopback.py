@@ -15,6 +15,7 @@ from tcr_hardware.emulators.motive_settings import MotiveSettings
 from tcr_hardware.errors import HardwareError, SocketError
 from tcr_hardware.natnet.client import NatNetClient
 from tcr_hardware.natnet.errors import RequestRefusedError, ServerSilentError, UnsupportedVersionError
+from tcr_hardware.natnet.frame import MODELS_CHANGED
 from tcr_hardware.natnet.settings import NatNetSettings
 
 NAMES = [f"m{i}.n{j}" for i in (1, 2) for j in (1, 2, 3)]
@@ -189,6 +190,7 @@ def test_a_data_port_in_use_still_leaves_the_command_socket():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port))
         with linked(data_port=port) as (_, client):
+            assert f"not listening at 127.0.0.1:{port}" in client.statistics().last_problem
             frames(client, 3)
 
 
@@ -271,7 +273,7 @@ def test_names_can_be_waited_for():
         motive.change_models([f"other.{name}" for name in NAMES])
         eventually(lambda: client.models is None or "other.m1.n1" in client.models.labels())
         assert "other.m1.n1" in client.wait_models().labels()
-        frames(client, 5)  # the change is no longer flagged
+        eventually(lambda: not client.newest().data.has(MODELS_CHANGED))
         motive.faults.mute = True
         motive.change_models(NAMES)
         eventually(lambda: client.models is None)

@@ -19,13 +19,14 @@ UNICAST, MULTICAST = NatNetSettings(multicast=False), NatNetSettings(multicast=T
 
 
 class Server:
-    """A scripted server: answers what a session sends; its clock is ours plus 1000 s."""
+    """A scripted server: answers what a session sends; its clock is ours plus an offset."""
 
     def __init__(self, version=(4, 1), *, own=None, bitstream=True, models=None):
         self.own, self.version, self.bitstream = own or version, version, bitstream
         self.models = models or {"m1": ["n1", "n2", "n3"]}
         self.asked = []
         self.number = 0
+        self.clock_offset = 1000.0
 
     def answers(self, datagram, now):
         message, _ = struct.unpack_from("<HH", datagram)
@@ -36,7 +37,7 @@ class Server:
         if message == REQUEST_MODELDEF:
             return [wire.packet(MODELDEF, wire.simple_models(self.version, **self.models))]
         if message == ECHO:
-            return [wire.packet(ECHOED, payload + struct.pack("<Q", round((now + 1000.0) * HZ)))]
+            return [wire.packet(ECHOED, payload + struct.pack("<Q", round((now + self.clock_offset) * HZ)))]
         if message == REQUEST and payload.startswith(b"Bitstream"):
             return self.on_bitstream(payload.rstrip(b"\0").decode().partition(",")[2])
         return []
@@ -51,7 +52,7 @@ class Server:
 
     def frame(self, now, *, number=None, params=0, version=None):
         self.number = self.number + 1 if number is None else number
-        ticks = tuple(round((now - late + 1000.0) * HZ) for late in (0.003, 0.001, 0.0))
+        ticks = tuple(round((now - late + self.clock_offset) * HZ) for late in (0.003, 0.001, 0.0))
         content = Wire(
             number=self.number, markers=[(1 << 16 | 1, (1, 2, 3), 0.01, 10, 0.0)], ticks=ticks, params=params
         )
@@ -210,6 +211,23 @@ def test_a_restarted_server_is_a_new_session_with_new_names_and_a_new_clock():
     frame = session.receive(server.frame(now), now)
     assert frame.exposure == pytest.approx(now - 0.003, abs=2e-4)
     assert frame.models is not None
+
+
+def test_a_restart_that_the_numbers_hide_shows_in_the_clock():
+    """The new count has just reached the old one when we hear of it again."""
+    session, server = Session(UNICAST, 0.0), Server((4, 1))
+    now = talk(session, server, 0.0)
+    session.receive(server.frame(now, number=70), now)
+    server.clock_offset += 500.0
+    assert session.receive(server.frame(now, number=71), now).session == 1
+    now = talk(session, server, now)
+    assert session.clock.steps == 1
+    frame = session.receive(server.frame(now, number=72), now)
+    assert (frame.session, frame.models) == (2, None)
+    now = talk(session, server, now)
+    frame = session.receive(server.frame(now), now)
+    assert frame.exposure == pytest.approx(now - 0.003, abs=2e-4)
+    assert session.order.lost == 0
 
 
 def test_silence_makes_the_client_connect_again():

@@ -15,7 +15,8 @@ from tcr_hardware.natnet.marker_frame import MarkerFrame
 from tcr_hardware.natnet.models import ModelDefinitions
 from tcr_hardware.rigid_transform import IDENTITY, Array, RigidTransform
 
-UNKNOWN_ID = -1
+#: No marker has it: numbers have 32 bits.
+UNKNOWN_ID = -(1 << 40)
 
 
 class MarkerMapError(HardwareError):
@@ -33,6 +34,19 @@ class MarkerMapError(HardwareError):
             hint="Labels are asset.marker, as in Motive's assets pane.",
         )
         self.labels, self.known = tuple(labels), tuple(known)
+
+
+class SharedMarkerError(HardwareError):
+    """Two nodes are said to carry the same marker.
+
+    Attributes:
+        nodes: Their names.
+    """
+
+    def __init__(self, first: NodeMarker, second: NodeMarker) -> None:
+        which = first.label or f"{first.asset}/{first.member}"
+        super().__init__(f"nodes {first.node} and {second.node} cannot both carry marker {which}")
+        self.nodes = (first.node, second.node)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +108,9 @@ class Gate:
 
     def width(self, elapsed: Array) -> Array:
         """Gate after ``elapsed`` [s]."""
-        return np.minimum(self.smallest_m + self.speed_m_s * np.maximum(elapsed, 0.0), self.largest_m)
+        with np.errstate(invalid="ignore"):  # infinite time at no speed, or no time at infinite speed
+            grown = self.smallest_m + self.speed_m_s * np.maximum(elapsed, 0.0)
+        return np.fmin(grown, self.largest_m)
 
 
 class MarkerMap:
@@ -103,6 +119,9 @@ class MarkerMap:
     Attributes:
         nodes: What is looked for, row by row.
         transform: From the camera system to the rig frame.
+
+    Raises:
+        SharedMarkerError: Two nodes with the same label or numbers.
     """
 
     def __init__(
@@ -115,6 +134,7 @@ class MarkerMap:
         max_residual_m: float = float("inf"),
     ) -> None:
         self.nodes, self.transform = tuple(nodes), transform
+        _check_shared(self.nodes)
         self._gate, self._max_residual = gate or Gate(), max_residual_m
         self._rest = np.array(rest, float).reshape(len(self.nodes), 3)
         self._unlabelled = np.array([node.label is None and node.asset is None for node in self.nodes], bool)
@@ -208,6 +228,14 @@ class MarkerMap:
         near = distance[nodes, picked] <= width[nodes]
         found[nodes[near]] = points[picked[near]]
         return found
+
+
+def _check_shared(nodes: Sequence[NodeMarker]) -> None:
+    owners: dict[tuple[str | int | None, ...], NodeMarker] = {}
+    for node in nodes:
+        identity = (node.label, node.asset, node.member)
+        if any(part is not None for part in identity) and owners.setdefault(identity, node) is not node:
+            raise SharedMarkerError(owners[identity], node)
 
 
 def _points_without_name(data: Frame) -> NDArray[np.float32]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from types import TracebackType
 
 import numpy as np
@@ -38,7 +39,8 @@ class MotiveEmulator:
         settings: Settings.
         scene: Names and bodies.
         version: Newest version served now.
-        frames_sent: Frames of which at least one copy was sent.
+        frames_sent: Frames taken while somebody listened; how many of them arrive is a matter of the faults.
+        failure: What ended the stream, for instance an error of ``positions``; None while it runs.
     """
 
     def __init__(
@@ -58,7 +60,7 @@ class MotiveEmulator:
         self.frames_sent = 0
         self._lock = threading.Lock()
         self._stopping = threading.Event()
-        self._failure: BaseException | None = None
+        self.failure: Exception | None = None
         self._thread: threading.Thread | None = None
         self._begin(self.settings.clock_offset_s)
 
@@ -96,8 +98,8 @@ class MotiveEmulator:
             self._thread.join()
             self._thread = None
         self.link.close()
-        if self._failure is not None:
-            raise self._failure
+        if self.failure is not None:
+            raise self.failure
 
     def restart(self) -> None:
         """Do as after a crash: frames count from 0, the clock begins anew, unicast clients are forgotten."""
@@ -131,7 +133,7 @@ class MotiveEmulator:
         try:
             self._loop()
         except Exception as error:
-            self._failure = error
+            self.failure = error
 
     def _loop(self) -> None:
         period = 1.0 / self.settings.rate_hz
@@ -199,10 +201,7 @@ class MotiveEmulator:
         self.frames_sent += bool(encoded)
 
     def _encode(self, version: Version, flags: int, stamp: Stamp, view: View) -> bytes:
-        flagged = Stamp(
-            stamp.number, stamp.timestamp, stamp.mid_exposure, stamp.received, stamp.transmit, stamp.latency,
-            stamp.params | flags,
-        )  # fmt: skip
+        flagged = replace(stamp, params=stamp.params | flags)
         return encoder.packet(FRAMEOFDATA, encoder.frame(version, flagged, self.scene, view))
 
     def _bitstream(self, listener: Client) -> int:

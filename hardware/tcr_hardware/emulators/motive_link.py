@@ -32,8 +32,6 @@ class MotiveLink:
     """
 
     def __init__(self, settings: MotiveSettings) -> None:
-        if settings.unicast_to not in ("sender", "data_port"):
-            raise ValueError(f"unicast_to is {settings.unicast_to!r}, allowed sender, data_port")
         self.settings = settings
         self.clients: dict[Address, Client] = {}
         self._everybody = Client((0, 0), float("inf"))

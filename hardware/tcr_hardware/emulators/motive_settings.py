@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 
@@ -38,3 +39,18 @@ class MotiveSettings:
     clock_drift: float = 20e-6
     keep_alive_timeout_s: float = 5.0
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be.
+
+        Raises:
+            ValueError: A setting is out of range; the message names it.
+        """
+        if self.unicast_to not in ("sender", "data_port"):
+            raise ValueError(f"unicast_to is {self.unicast_to!r}, allowed sender, data_port")
+        if re.fullmatch(r"\d+\.\d+", self.version) is None:
+            raise ValueError(f"version is {self.version!r}, must be like 4.1")
+        if not (self.rate_hz > 0.0 and self.latency_s >= 0.0):
+            raise ValueError(
+                f"rate_hz is {self.rate_hz} and latency_s {self.latency_s}, must not be negative"
+            )

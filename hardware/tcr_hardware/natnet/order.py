@@ -69,6 +69,10 @@ class FrameOrder:
             return Arrival.DUPLICATE
         return self._strange_number(number, now, models_changed)
 
+    def begin_anew(self) -> None:
+        """Take the next frame for the first of a new session, whatever its number."""
+        self.last = None
+
     def _take(self, number: int, now: float, arrival: Arrival) -> Arrival:
         self.last, self._at = number, now
         self._strange.clear()

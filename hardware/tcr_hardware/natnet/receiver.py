@@ -29,6 +29,7 @@ class Receiver:
     def __init__(self, sockets: Sockets, session: Session, inbox: Inbox, server: tuple[str, int]) -> None:
         self._sockets, self._session, self._inbox, self._server = sockets, session, inbox, server
         self.foreign = 0
+        session.last_problem = sockets.note
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="natnet", daemon=True)
         self._thread.start()

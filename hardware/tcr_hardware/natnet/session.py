@@ -203,8 +203,8 @@ class Session:
             raise MalformedPacketError("echo of a request that we did not send", 0, len(payload))
         self._echoes.remove(client_ns)
         if self.clock.add(client_ns * 1e-9, now, ticks):
-            self.last_problem = "the server's clock jumped"
-            self._forget_models()
+            self.last_problem = "the server's clock jumped: it was started anew"
+            self.order.begin_anew()
 
     def _response(self, message: int, payload: bytes) -> None:
         if not self.choice.answered(message == Message.RESPONSE, payload):

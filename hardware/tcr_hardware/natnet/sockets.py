@@ -93,6 +93,7 @@ class Sockets:
     command: socket.socket
     data: dict[tuple[str, int], socket.socket] = field(default_factory=dict)
     note: str = ""
+    _tried: set[tuple[str, int]] = field(default_factory=set)
 
     @classmethod
     def open(cls, settings: NatNetSettings) -> Sockets:
@@ -119,8 +120,9 @@ class Sockets:
             SocketError: The group cannot be joined.
         """
         place = (group if self.settings.multicast else self.settings.local, port)
-        if place in self.data:
+        if place in self._tried:
             return False
+        self._tried.add(place)
         if self.settings.multicast:
             self.data[place] = _multicast(self.settings.local, group, port)
             return True
