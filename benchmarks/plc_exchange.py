@@ -21,7 +21,7 @@ from rich.table import Table
 
 from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.modbus.bus import PlcBus
-from tcr_hardware.modbus.errors import LinkTimeoutError
+from tcr_hardware.modbus.errors import LinkError, LinkTimeoutError
 from tcr_hardware.modbus.registers import Control, Status
 from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
 
@@ -44,16 +44,19 @@ def serve(pipe: Connection) -> None:
                 plc.faults.set(word)
 
 
-def paced(bus: PlcBus, hz: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Round trips and latenesses of the cycle starts [ms]."""
-    round_trips, late, start = [], [], time.monotonic() + 0.05
+def paced(bus: PlcBus, hz: float, seconds: float) -> tuple[np.ndarray, np.ndarray, int]:
+    """Round trips and latenesses of the cycle starts [ms], and exchanges that failed."""
+    round_trips, late, failed, start = [], [], 0, time.monotonic() + 0.05
     for k in range(round(hz * seconds)):
         deadline = start + k / hz
         time.sleep(max(deadline - time.monotonic(), 0.0))
         late.append(time.monotonic() - deadline)
         at = round(5_000 * np.sin(2 * np.pi * 0.2 * k / hz))
-        round_trips.append(bus.exchange((at,) * 6, FOLLOW, SPEED).round_trip_s)
-    return 1e3 * np.array(round_trips), 1e3 * np.array(late)
+        try:
+            round_trips.append(bus.exchange((at,) * 6, FOLLOW, SPEED).round_trip_s)
+        except LinkError:
+            failed += 1
+    return 1e3 * np.array(round_trips), 1e3 * np.array(late), failed
 
 
 def arm(bus: PlcBus) -> None:
@@ -107,22 +110,18 @@ def main() -> None:
     plc = multiprocessing.Process(target=serve, args=(theirs,))
     plc.start()
     address, device = ours.recv()
-    table = Table("wire", "exchange", "Hz", "p50 ms", "p90", "p99", "max", "start late p50", "p99", "retries")
-    for wire, link in (("TCP", TcpLink(*address)), ("RTU, pty", RtuLink(device, 230400))):
+    heads = ("wire", "how", "Hz", "p50", "p90", "p99", "max", "late p50", "late p99", "again", "failed")
+    table = Table(*heads, title="round trip and lateness of the cycle start [ms]")
+    for wire, link in (("TCP", TcpLink(*address)), ("RTU", RtuLink(device, 230400))):
         for exchange in ("fc23", "fc16_fc3"):
             for hz in (20, 50, 100):
                 with PlcBus(BusSettings(link, exchange=exchange)) as bus:
                     arm(bus)
-                    trips, late = paced(bus, hz, seconds)
+                    trips, late, failed = paced(bus, hz, seconds)
                     bus.exchange(bus.info.status.positions_um, Control(0), SPEED)
                     cells = [*np.percentile(trips, (50, 90, 99, 100)), *np.percentile(late, (50, 99))]
-                    table.add_row(
-                        wire,
-                        exchange,
-                        str(hz),
-                        *(f"{cell:.2f}" for cell in cells),
-                        str(bus.statistics.retries),
-                    )
+                    counts = (str(bus.statistics.retries), str(failed))
+                    table.add_row(wire, exchange, str(hz), *(f"{cell:.2f}" for cell in cells), *counts)
     Console().print(table)
     with PlcBus(BusSettings(TcpLink(*address))) as bus:
         ours.send("silence")

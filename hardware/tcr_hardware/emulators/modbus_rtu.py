@@ -103,7 +103,7 @@ def request_length(start: bytes) -> int:
 
 
 def crc(data: bytes) -> bytes:
-    """CRC-16 of Modbus, low byte first (Modbus over serial line V1.02, section 6.2.2)."""
+    """CRC-16 of Modbus, low byte first ([MSL06], section 6.2.2)."""
     remainder = 0xFFFF
     for byte in data:
         remainder ^= byte

@@ -1,7 +1,7 @@
 """A small Modbus server, TCP and RTU, that can be told to misbehave.
 
 Written here and not taken from pymodbus: its client is on the other end, and a mistake that both ends share would
-not be seen; and the faults need the bytes on the wire. Source: Modbus application protocol V1.1b3.
+not be seen; and the faults need the bytes on the wire. Source: [MAP12].
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from tcr_hardware.errors import HardwareError
 LOOK_S = 0.02
 #: How long a connection may need for an answer that it has begun, when it is reset [s].
 LONGEST_ANSWER_S = 1.0
-#: Unit numbers that a TCP server takes for itself (Modbus messaging on TCP/IP V1.0b, section 4.4.2.1).
+#: Unit numbers that a TCP server takes for itself ([MTI06], section 4.4.2.1).
 ANY_UNIT = (0, 255)
 LONGEST_BODY = 254
 

@@ -211,8 +211,12 @@ class PlcBus:
         self._link.open()
         self._liveness = Liveness()
         self.statistics.reconnects += 1
-        if (found := self._identify()) != codec:
-            raise PlcMismatchError("ORDER_PROBE", f"{found.word_order}", codec.word_order)
+        try:
+            if (found := self._identify()) != codec:
+                raise PlcMismatchError("ORDER_PROBE", found.word_order, codec.word_order)
+        except BaseException:
+            self._link.close()  # or the next exchange would write to a PLC that nobody has identified
+            raise
 
     def _identify(self) -> WordCodec:
         """Word and byte order of the PLC."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tcr_hardware.errors import HardwareError
 
-#: Modbus application protocol V1.1b3, section 7.
+#: [MAP12], section 7.
 EXCEPTION_NAMES = {
     1: "illegal function",
     2: "illegal data address",

@@ -34,7 +34,7 @@ READ, WRITE, READ_WRITE = 3, 16, 23
 SETTLE_S = 0.005
 LONGEST_FRAME = 256
 #: What the parser of pymodbus can raise on bytes that are no Modbus answer.
-PARSER_ERRORS = (ModbusException, ValueError, IndexError, KeyError, TypeError, struct.error)
+PARSER_ERRORS = (ModbusException, ValueError, IndexError, struct.error)
 
 # Without a handler Python prints the library's warnings on stderr, in the middle of our own output.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())

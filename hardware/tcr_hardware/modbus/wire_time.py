@@ -11,7 +11,7 @@ from tcr_hardware.modbus.settings import BusSettings, RtuLink
 WRITE_BYTES = 9 + 8
 READ_BYTES = 8 + 5
 READ_WRITE_BYTES = 13 + 5
-#: Above this rate the silence before a frame is fixed (Modbus over serial line V1.02, section 2.5.1.1).
+#: Above this rate the silence before a frame is fixed ([MSL06], section 2.5.1.1).
 FIXED_SILENCE_BAUD, FIXED_SILENCE_S = 19200, 1.75e-3
 #: The standard counts eleven bits for a character of the silence.
 SILENCE_BITS = 3.5 * 11
