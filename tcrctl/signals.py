@@ -39,7 +39,7 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class RawFrame:
-    """Markers of one camera frame as they came, before they were mapped to the robot.
+    """Markers of one camera frame as they came, before they were mapped to the robot; none if the rig says so.
 
     Attributes:
         number: Frame number of the camera system.

@@ -162,23 +162,22 @@ class NatNetCameras:
         valid[self._rows] = located.valid
         doubts = Counter(reason for reason in located.reasons if reason)
         text = ", ".join(f"{count} {reason}" for reason, count in sorted(doubts.items()))
-        return Sighting(frame.taken_at, nodes, valid, text, _raw(frame))
+        return Sighting(frame.taken_at, nodes, valid, text, self._raw(frame))
+
+    def _raw(self, frame: MarkerFrame) -> RawFrame:
+        markers = frame.data.markers if self._settings.log_raw else frame.data.markers[:0]
+        return RawFrame(
+            number=frame.number,
+            session=frame.session,
+            delay=frame.arrival - frame.taken_at,
+            ids=markers["id"].astype(np.int32),
+            positions=np.ascontiguousarray(markers["position"], dtype=np.float32),
+            flags=markers["params"].astype(np.int32),
+        )
 
     def close(self) -> None:
         """End the connection."""
         self.client.close()
-
-
-def _raw(frame: MarkerFrame) -> RawFrame:
-    markers = frame.data.markers
-    return RawFrame(
-        number=frame.number,
-        session=frame.session,
-        delay=frame.arrival - frame.taken_at,
-        ids=markers["id"].astype(np.int32),
-        positions=np.ascontiguousarray(markers["position"], dtype=np.float32),
-        flags=markers["params"].astype(np.int32),
-    )
 
 
 def _marker_map(

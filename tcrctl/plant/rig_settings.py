@@ -35,6 +35,7 @@ class CameraSettings(Settings):
     jump_gate_mm: float = quantity(
         "mm", "a marker that has jumped further is not used; less than half the marker distance", 24.0, gt=0
     )
+    log_raw: bool = Field(default=True, description="keep every marker of every frame used in the log")
     max_residual_mm: float | None = quantity("mm", "markers with a larger residual are not used", None, gt=0)
 
 
