@@ -171,6 +171,7 @@ class Bench:
     robot: Any
     rules: dict[str, Any]
     watchdog_ms: int = 200
+    high_mm: float = HIGH_UM / 1e3
     sent: list = field(default_factory=list)
     events: list = field(default_factory=list)
 
@@ -204,7 +205,7 @@ class Bench:
         self.plc.stop()
 
     def loaded(self):
-        cables = {f"c{i}": {"axis": i, "min_mm": -20, "max_mm": 20} for i in range(1, 5)}
+        cables = {f"c{i}": {"axis": i, "min_mm": -20, "max_mm": self.high_mm} for i in range(1, 5)}
         rig = RigFile.model_validate_json(json.dumps({
             "name": "matrix",
             "cameras": {"kind": "natnet", "transport": "unicast", "command_port": self.motive.address[1]},

@@ -12,7 +12,8 @@ import pytest
 from fault_matrix import BEFORE, CASES, PATIENT, Bench, Loop, bound, play, suite_cells, violations
 
 from tcr_hardware.modbus.registers import Status
-from tcrctl.errors import ArmingRefusedError, RigStopError
+from tcrctl.errors import ArmingRefusedError, InputError, RigStopError
+from tcrctl.plant.bench import build_rig
 from tcrctl.plant.session import Session
 from tcrctl.rig.zero import reset_rig
 
@@ -97,3 +98,20 @@ def test_after_a_fault_nothing_is_armed_until_an_operator_has_reset_it(tcr5x4):
         plant.start()
         plant.close()
         assert str(plant.supervisor.state) == "disarmed"
+
+
+def test_a_rig_file_that_allows_more_than_the_plc_is_refused(tcr5x4):
+    with Bench(tcr5x4, {**PATIENT, "max_step_mm": 7.0}, WATCHDOG_MS, high_mm=30) as bench:
+        with pytest.raises(InputError) as caught:
+            bench.plant()
+        assert "cable c3: -20 to 30 mm on axis 3, PLC -25 to 25 mm" in str(caught.value)
+        assert "max_step_mm 7 mm, PLC 6 mm" in str(caught.value)
+    with Bench(tcr5x4, PATIENT, watchdog_ms=200) as bench, pytest.raises(InputError, match="watchdog"):
+        build_rig(bench.loaded(), tcr5x4, 0.15, Session())
+
+
+def test_a_label_that_the_cameras_do_not_know_is_refused(tcr5x4):
+    with Bench(tcr5x4, PATIENT, WATCHDOG_MS) as bench:
+        bench.motive.change_models([f"marker.{i}" for i in range(15)])
+        with pytest.raises(InputError, match=r"tracks no marker m1.n1"):
+            bench.plant()
