@@ -139,3 +139,13 @@ def test_verbs_of_one_robot_ask_which_one(capsys):
     assert "hang tcr600, tcr700; choose one with --robot" in capsys.readouterr().err
     assert main(["rig", "zero", "loopback", "--robot", "tcr60", "--dry-run"]) == 2
     assert "Did you mean tcr600?" in capsys.readouterr().err
+
+
+def test_the_schema_of_rig_files_knows_every_key_of_the_shipped_ones(capsys):
+    assert main(["schema", "--rig"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    for path in shipped.rigs().values():
+        assert set(strict_yaml.load(path).data) <= set(schema["properties"])
+    assert {"robots", "cameras"} <= set(schema["required"])
+    assert '"unit": "mm"' in json.dumps(schema)
+    assert main(["schema", "--rig", "--robot"]) == 2
