@@ -1,10 +1,10 @@
 """Experiments on the emulated bench against the same on the simulated plant: errors, and camera-to-drive latency.
 
-    python benchmarks/loopback.py                # letter_t and fixed_point_rotation at 20 and 100 Hz, about 8 minutes
+    python benchmarks/loopback.py                # letter_t, fixed_point_rotation at 20 and 100 Hz, 8 minutes
     python benchmarks/loopback.py letter_t 100   # one experiment, one rate
 
-Needs a computer that is not busy: cameras, PLCs, two robots and the controller share it, in real time. On a bench the
-error is that of the estimate, as nobody knows more.
+Needs a computer that is not busy: cameras, PLCs, two robots and the controller share it, in real time. On a bench
+the error is that of the estimate, as nobody knows more.
 """
 
 from __future__ import annotations
