@@ -194,6 +194,32 @@ def test_a_data_port_in_use_still_leaves_the_command_socket():
             frames(client, 3)
 
 
+@pytest.mark.parametrize(
+    "way",
+    [
+        {"unicast_to": "data_port"},
+        pytest.param(
+            {"multicast": True, "group": "239.255.42.98"},
+            marks=pytest.mark.skipif(
+                not multicast_works(), reason="this system has no multicast on 127.0.0.1"
+            ),
+        ),
+    ],
+)
+def test_the_client_listens_where_the_server_says_it_sends(way):
+    with linked({"data_port": None}, version="3.1", **way) as (_, client):
+        frames(client, 3)
+
+
+def test_two_clients_are_served_in_their_own_versions():
+    with linked(version="4.3") as (motive, first), client_of(motive, bitstream="3.0") as second:
+        assert motive.clients == 2
+        for client, version in ((first, "4.3"), (second, "3.0")):
+            frames(client, 5)
+            assert str(client.version) == version
+            assert client.statistics().malformed == 0
+
+
 @pytest.mark.parametrize("loss", [0.01, 0.1, 0.5])
 def test_lost_frames_are_counted_and_the_others_used(loss):
     with linked(rate_hz=400.0) as (motive, client):

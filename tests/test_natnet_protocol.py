@@ -197,6 +197,16 @@ def test_a_clock_that_was_set_anew_is_noticed():
     assert clock.local(510 * HZ) == pytest.approx(1.2501)
 
 
+def test_a_small_contradiction_moves_the_clock_but_is_no_restart():
+    """A drift that nobody promised, 5 ms in a quarter of a second."""
+    clock = ServerClock()
+    clock.reset(HZ)
+    clock.add(1.0, 1.0002, 10 * HZ)
+    assert not clock.add(1.25, 1.2502, round(10.255 * HZ))
+    assert clock.steps == 0
+    assert clock.local(round(10.255 * HZ)) == pytest.approx(1.2501, abs=1e-6)
+
+
 def test_without_ticks_or_echo_there_is_no_local_time():
     clock = ServerClock()
     clock.reset(HZ)

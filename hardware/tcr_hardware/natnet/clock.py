@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-#: Clocks of two computers drift apart by less than this [s/s]; crystals are within 50e-6 each.
-LARGEST_DRIFT = 100e-6
+#: Clocks of two computers drift apart by less than this [s/s]: crystals are within 50e-6 each, and a time
+#: service may slew ours by 500e-6.
+LARGEST_DRIFT = 600e-6
+#: A contradiction beyond this is no error of measurement: the server's clock began anew [s].
+SMALLEST_JUMP = 0.01
 
 
 @dataclass(slots=True)
@@ -31,8 +34,8 @@ class ServerClock:
     """Offset between the server's clock and ours, with a bound.
 
     Of all echoes so far the one with the smallest uncertainty *now* is used: a short round trip counts until drift
-    has eaten its advantage. An answer that contradicts it beyond both bounds means that the server's clock was set
-    anew.
+    has eaten its advantage. An answer that contradicts it beyond both bounds is believed instead; far beyond them
+    it means that the server's clock began anew.
 
     Attributes:
         hz: Ticks per second of the server's clock; 0 while unknown.
@@ -66,9 +69,10 @@ class ServerClock:
             self.best = echo
             return False
         bound = self.best.uncertainty_at(received)
-        jumped = abs(echo.offset - self.best.offset) > bound + half
-        if jumped or half <= bound:
+        contradiction = abs(echo.offset - self.best.offset) - (bound + half)
+        if contradiction > 0.0 or half <= bound:
             self.best = echo
+        jumped = contradiction > SMALLEST_JUMP
         self.steps += jumped
         return jumped
 
