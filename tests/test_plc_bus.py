@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 
 from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_faults import FAULTS, UnknownFaultError
+from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.modbus.bus import PlcBus
 from tcr_hardware.modbus.errors import (
@@ -35,9 +37,22 @@ SPEED = 50_000
 PATIENT_S = 0.5
 
 
+#: A machine that does other work must not trip the watchdog of tests that are not about it.
+CALM = PlcSettings(limits=PlcLimitSettings(watchdog_ms=3000))
+
+
+@pytest.fixture
+def watched_plc():
+    """A PLC with the usual watchdog."""
+    with PlcEmulator() as emulator:
+        emulator.start()
+        yield emulator
+
+
 @pytest.fixture
 def plc(request):
-    with PlcEmulator() as emulator:
+    """A PLC whose watchdog is slow."""
+    with PlcEmulator(CALM) as emulator:
         tcp_only = "wire" in request.fixturenames and request.getfixturevalue("wire") == "tcp"
         emulator.start(rtu=None if tcp_only else "pty")
         yield emulator
@@ -85,7 +100,7 @@ def settle(bus, setpoints, control, *, exchanges=20, pause_s=0.004):
 def test_opening_finds_the_limits_and_writes_nothing(plc, wire):
     with PlcBus(settings_for(plc, wire)) as bus:
         limits = bus.info.limits
-    assert (limits.watchdog_ms, limits.step_max_um, limits.vmax_um_s) == (200, 6000, 100_000)
+    assert (limits.watchdog_ms, limits.step_max_um, limits.vmax_um_s) == (3000, 6000, 100_000)
     assert limits.min_um == (-60_000,) * 6
     assert limits.max_um == (60_000,) * 6
     assert Status.READY in bus.info.status.status
@@ -120,7 +135,7 @@ def test_every_exchange_moves_seq_and_heartbeat_by_one_also_over_the_wrap(bus, p
 
 @pytest.mark.parametrize("low_first", [False, True])
 def test_a_plc_with_either_word_order_is_understood_when_the_order_may_be_any(low_first):
-    with PlcEmulator(PlcSettings(low_word_first=low_first)) as plc:
+    with PlcEmulator(replace(CALM, low_word_first=low_first)) as plc:
         plc.start()
         with PlcBus(settings_for(plc, word_order="auto")) as bus:
             assert bus.info.word_order == ("low_first" if low_first else "high_first")
@@ -134,7 +149,7 @@ def test_a_site_may_have_its_own_addresses_and_formats(wire):
                "HEARTBEAT": {"address": 39}, "VMAX": {"address": 52}, "SEQ": {"address": 53},
                "ACT": {"scale": 10.0}}  # fmt: skip
     rows = register_map(6, changes)
-    with PlcEmulator(PlcSettings(map=rows)) as plc:
+    with PlcEmulator(replace(CALM, map=rows)) as plc:
         plc.start(rtu="pty")
         with PlcBus(settings_for(plc, wire, map=rows)) as bus:
             settle(bus, STILL, ON, exchanges=3)
@@ -189,6 +204,19 @@ def test_a_serial_device_that_does_not_exist_is_named(tmp_path):
     assert "no such device" in lost.value.hint
 
 
+def test_a_closed_bus_stays_closed_until_it_is_opened_again(bus, plc):
+    bus.exchange(STILL, Control.RUN, SPEED)
+    bus.close()
+    bus.close()
+    before = plc.read(0, 16)
+    for use in (lambda: bus.exchange(STILL, Control.RUN, SPEED), bus.read_status, bus.read_slow):
+        with pytest.raises(LinkLostError, match="not open"):
+            use()
+    assert plc.read(0, 16) == before
+    bus.open()
+    bus.exchange(STILL, Control.RUN, SPEED)
+
+
 def test_a_bad_set_point_is_never_sent_and_does_not_count(bus, plc):
     bus.exchange(STILL, Control.RUN, SPEED)
     before = plc.read(0, 16)
@@ -211,7 +239,7 @@ def test_an_exception_answer_is_an_error_with_its_code_and_is_not_repeated(bus, 
 
 @pytest.mark.parametrize("fault", ["silence", "corrupt", "truncate", "wrong_echo"])
 def test_a_single_bad_answer_is_survived_by_one_retry_of_the_same_set(plc, wire, exchange, fault):
-    with PlcBus(settings_for(plc, wire, exchange=exchange, timeout_s=0.1)) as bus:
+    with PlcBus(settings_for(plc, wire, exchange=exchange, timeout_s=0.2)) as bus:
         settle(bus, STILL, ON, exchanges=3)
         status = settle(bus, STILL, FOLLOW, exchanges=3)
         plc.faults.set(fault, count=1)
@@ -243,12 +271,12 @@ def test_without_retries_one_silence_is_an_error(plc, wire):
 
 
 def test_a_late_answer_never_passes_for_the_next_one(plc, wire, exchange):
-    with PlcBus(settings_for(plc, wire, exchange=exchange, timeout_s=0.08, retries=0)) as bus:
+    with PlcBus(settings_for(plc, wire, exchange=exchange, timeout_s=0.15, retries=0)) as bus:
         settle(bus, STILL, ON, exchanges=3)
         seen = []
         for k in range(1, 9):
             if k in (3, 4, 6):
-                plc.faults.set("delay", seconds=0.1, count=1)
+                plc.faults.set("delay", seconds=0.17, count=1)
             cycle = plc.snapshot()["cycle"]
             try:
                 status = bus.exchange((10 * k,) * 6, ON, SPEED)
@@ -259,13 +287,13 @@ def test_a_late_answer_never_passes_for_the_next_one(plc, wire, exchange):
                 assert status.plc_cycle >= cycle
             time.sleep(0.01)
         assert seen.count(None) >= 2
-        assert seen[-1] is not None
+        assert eventually(lambda: _answers(bus))
 
 
 def test_late_answers_on_a_serial_line_are_counted(plc):
-    with PlcBus(settings_for(plc, "rtu", timeout_s=0.08, retries=1)) as bus:
+    with PlcBus(settings_for(plc, "rtu", timeout_s=0.3, retries=1)) as bus:
         bus.exchange(STILL, Control.RUN, SPEED)
-        plc.faults.set("delay", seconds=0.1, count=1)
+        plc.faults.set("delay", seconds=0.33, count=1)
         assert bus.exchange(STILL, Control.RUN, SPEED).attempts == 2
         assert bus.statistics.timeouts == 1
 
@@ -289,15 +317,15 @@ def test_after_a_reset_the_plc_is_identified_again_before_the_set_is_repeated(pl
 def test_a_refused_connection_is_an_error_until_the_plc_listens_again(plc):
     with PlcBus(settings_for(plc, timeout_s=0.1)) as bus:
         plc.faults.set("refuse")
-        assert eventually(lambda: not _accepts(bus))
+        assert eventually(lambda: not _answers(bus))
         plc.faults.clear("refuse")
-        assert eventually(lambda: _accepts(bus))
+        assert eventually(lambda: _answers(bus))
 
 
-def _accepts(bus):
+def _answers(bus):
     try:
         bus.exchange(STILL, Control.RUN, SPEED)
-    except LinkLostError:
+    except LinkError:
         return False
     return True
 
@@ -346,26 +374,27 @@ def test_a_word_order_that_changes_under_way_is_noticed_on_both_ends(bus, plc):
     assert plc.positions_um() == pytest.approx((1000,) * 6, abs=20)
 
 
-def test_a_host_that_dies_leaves_a_robot_that_holds_within_the_watchdog_time(plc):
-    with PlcBus(settings_for(plc)) as bus:
+def test_a_host_that_dies_leaves_a_robot_that_holds_within_the_watchdog_time(watched_plc):
+    with PlcBus(settings_for(watched_plc)) as bus:
         settle(bus, STILL, ON, exchanges=3)
         for k in range(1, 6):
             bus.exchange((500 * k,) * 6, FOLLOW, SPEED)
             time.sleep(0.01)
-    assert eventually(lambda: Status.WATCHDOG in plc.snapshot()["status"])
-    held = plc.snapshot()["active_um"]
+    assert eventually(lambda: Status.WATCHDOG in watched_plc.snapshot()["status"])
+    held = watched_plc.snapshot()["active_um"]
     time.sleep(0.05)
-    assert plc.snapshot()["active_um"] == held
-    with PlcBus(settings_for(plc)) as bus:
+    assert watched_plc.snapshot()["active_um"] == held
+    with PlcBus(settings_for(watched_plc)) as bus:
         assert Status.WATCHDOG in settle(bus, STILL, FOLLOW).status
-        assert plc.snapshot()["active_um"] == held
+        assert watched_plc.snapshot()["active_um"] == held
         settle(bus, STILL, Control.RUN | Control.RESET, exchanges=3)
         assert Status.ENABLED in settle(bus, STILL, ON, exchanges=3).status
 
 
-def test_reading_does_not_feed_the_watchdog(bus, plc):
-    settle(bus, STILL, ON, exchanges=3)
-    assert eventually(lambda: Status.WATCHDOG in bus.read_status().status)
+def test_reading_does_not_feed_the_watchdog(watched_plc):
+    with PlcBus(settings_for(watched_plc)) as bus:
+        settle(bus, STILL, ON, exchanges=3)
+        assert eventually(lambda: Status.WATCHDOG in bus.read_status().status)
 
 
 def test_the_estop_is_seen_and_latched(bus, plc):
@@ -401,7 +430,7 @@ def test_another_master_that_writes_is_found_out(bus, plc):
 
 
 def test_wrong_echoes_that_do_not_end_are_an_error(plc, wire):
-    with PlcBus(settings_for(plc, wire, exchange="fc16_fc3", timeout_s=0.1)) as bus:
+    with PlcBus(settings_for(plc, wire, exchange="fc16_fc3")) as bus:
         plc.faults.set("wrong_echo")
         with pytest.raises(WrongEchoError, match="wrote 16 registers at 0, the PLC confirms 16 at 1"):
             bus.exchange(STILL, Control.RUN, SPEED)
@@ -434,6 +463,22 @@ def test_a_serial_line_with_a_baud_rate_answers_no_faster_than_its_wire(plc):
         with PlcBus(BusSettings(RtuLink(slow.device, 57600), exchange="fc23", timeout_s=PATIENT_S)) as bus:
             status = bus.exchange(STILL, Control.RUN, SPEED)
         assert status.round_trip_s >= 0.0184
+
+
+@pytest.mark.parametrize("axes", [1, 3, 12])
+def test_a_robot_may_have_any_number_of_axes(axes):
+    rows = register_map(axes)
+    with PlcEmulator(replace(CALM, axes=axes)) as plc:
+        plc.start()
+        with PlcBus(settings_for(plc, map=rows)) as bus:
+            settle(bus, (0,) * axes, ON, exchanges=3)
+            target = tuple(100 * axis for axis in range(axes))
+            assert settle(bus, target, FOLLOW, exchanges=40).positions_um == pytest.approx(target, abs=20)
+
+
+def test_an_emulator_and_its_map_have_the_same_axes():
+    with pytest.raises(HardwareError, match="3 axes cannot serve a map of 6 axes"):
+        PlcEmulator(PlcSettings(axes=3, map=register_map(6)))
 
 
 def test_the_emulator_leaves_no_thread_behind():

@@ -70,14 +70,20 @@ class PlcEmulator:
     def __init__(
         self, settings: PlcSettings | None = None, *, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Build the PLC with all drives at rest at 0; nothing is opened yet."""
+        """Build the PLC with all drives at rest at 0; nothing is opened yet.
+
+        Raises:
+            HardwareError: The register map is one for another number of axes.
+        """
         self._settings = settings = settings or PlcSettings()
+        rows = settings.map or register_map(settings.axes)
+        if rows.axes != settings.axes:
+            raise HardwareError(f"a PLC with {settings.axes} axes cannot serve a map of {rows.axes} axes")
         self._clock, self._lock = clock, threading.RLock()
         self._program = PlcProgram(settings.axes, settings.limits, settings.servo, zeroed=settings.zeroed)
         self._tensions: tuple[float, ...] = (0.0,) * settings.axes
         self._tensions_known = False
         self.faults = PlcFaults(self._fault_changed)
-        rows = settings.map or register_map(settings.axes)
         self._image = PlcImage(rows, settings.low_word_first, self.faults, self._values)
         self._server = ModbusServer(settings.unit, self, self.faults)
         self._tcp: TcpPort | None = None

@@ -67,6 +67,7 @@ class PlcBus:
         self._one_request = settings.exchange != "fc16_fc3"
         self._blocks, self._counters, self._liveness = Blocks(self._map, WordCodec()), Counters(), Liveness()
         self._info: PlcInfo | None = None
+        self._is_open = False  # stays so while a lost connection waits for its next attempt
         self.statistics = BusStatistics()
 
     def __enter__(self) -> PlcBus:
@@ -97,7 +98,7 @@ class PlcBus:
             PlcExceptionError: The PLC does not know the registers.
             PlcMismatchError: It is not the PLC of this register map.
         """
-        self._link.close()
+        self.close()
         with self._link.patience(OPENING_S):
             self._link.open()
             try:
@@ -105,6 +106,7 @@ class PlcBus:
             except BaseException:
                 self._link.close()
                 raise
+        self._is_open = True
         return self._info
 
     def _find_out(self) -> PlcInfo:
@@ -118,6 +120,7 @@ class PlcBus:
 
     def close(self) -> None:
         """Close the connection; sends nothing. Never raises."""
+        self._is_open = False
         self._link.close()
 
     def check_period(self, period_s: float) -> float:
@@ -206,7 +209,7 @@ class PlcBus:
     def _reconnect(self) -> None:
         """Open the connection again; before anything is written, the PLC has to be the same one."""
         codec = self._blocks.codec
-        if self._info is None:
+        if not self._is_open:
             raise LinkLostError("the bus to the PLC is not open")
         self._link.open()
         self._liveness = Liveness()
