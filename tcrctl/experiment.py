@@ -28,8 +28,9 @@ from tcrctl.robot import pose
 from tcrctl.robot.model import FIXED
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.safety import SafetyLimits
-from tcrctl.signals import Array
+from tcrctl.signals import Array, StepRecord
 from tcrctl.spec import ExperimentSpec, LoadedSpec
+from tcrctl.task.task import Task, build_task, task_targets
 from tcrctl.trajectory.start_blend import StartBlend
 from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
 
@@ -138,9 +139,10 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
     spec = loaded.spec.model_copy(update=changes)
     with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
         robot = build_robot(loaded.robot)
-        trajectory = build_trajectory(spec.trajectory, robot)
-        wants_pose = isinstance(spec.controller, IocSettings) and spec.controller.output == "pose"
-        if wants_pose and trajectory.normal(np.zeros(1)) is None:
+        targets = task_targets(spec.task, spec.seed) if spec.task else {}
+        trajectory = build_trajectory(spec.trajectory, robot, targets)
+        tracks = None if isinstance(spec.controller, OpenLoopSettings) else spec.controller.output
+        if tracks == "pose" and trajectory.normal(np.zeros(1)) is None:
             raise InputError(
                 f"{loaded.path}: controller.output: pose needs a trajectory with an orientation; "
                 f"trajectory.kind: {spec.trajectory.kind} leaves it free"
@@ -166,6 +168,12 @@ def plan(experiment: Experiment) -> StaticPath:
     if isinstance(controller, OpenLoopSettings):
         return check_drives(experiment.trajectory, robot, limits)
     return check_feasibility(experiment.trajectory, robot, limits)
+
+
+def make_task(experiment: Experiment) -> Task | None:
+    """Build what judges a run by its task, if the experiment has one; every run needs a new one."""
+    spec, modules = experiment.spec, experiment.loaded.robot.modules
+    return build_task(spec.task, spec.seed, 1e-3 * modules.rod_diameter_mm) if spec.task else None
 
 
 def build_plant(experiment: Experiment, session: Session | None = None) -> tuple[RunnablePlant, State | None]:
@@ -226,13 +234,20 @@ def _rehearse(experiment: Experiment) -> None:
     simulated = SimulatedSettings(kind="simulated")
     plant = SimulatedPlant(simulated, experiment.robot, experiment.period, experiment.spec.seed)
     parts, metrics = build_parts(experiment, plant, plant.state), Metrics(WARM_UP_STEPS, paced=False)
+    task = make_task(experiment)
+
+    def record(step: StepRecord) -> None:
+        metrics.add(step)
+        if task is not None:
+            task.observe(step)
+
     with suppress(StoppedError):  # a run that ends so shall do it with a log
         run_loop(
             parts.trajectory,
             parts.estimator,
             parts.controller,
             plant,
-            metrics.add,
+            record,
             period=experiment.period,
             duration=WARM_UP_STEPS * experiment.period,
             pace=Unpaced(),

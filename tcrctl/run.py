@@ -12,9 +12,10 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedError, TcrctlError
-from tcrctl.experiment import Experiment, Notify, Parts, build_parts, build_plant, silent
+from tcrctl.experiment import Experiment, Notify, Parts, build_parts, build_plant, make_task, silent
 from tcrctl.interruption import Interruption
 from tcrctl.log.geometry import CableRoute, LogGeometry
 from tcrctl.log.writer import LogWriter
@@ -123,16 +124,18 @@ def _recorded_run(
     experiment: Experiment, parts: Parts, pace: Pace, folder: RunFolder, log: LogWriter, progress: Progress
 ) -> Summary:
     """Run, close the plant, finish the log."""
-    metrics = Metrics(experiment.steps, paced=isinstance(pace, RealTime))
+    metrics, task = Metrics(experiment.steps, paced=isinstance(pace, RealTime)), make_task(experiment)
 
     def record(step: StepRecord) -> None:
         log.step(step)
         metrics.add(step)
+        for event in () if task is None else task.observe(step):
+            log.event(event.t, event.kind, event.level, event.message)
         progress(step.k + 1, experiment.steps)
 
     with log:
         failure = _drive(experiment, parts, pace, record, log)
-        summary = _summary(experiment, folder, metrics, failure)
+        summary = _summary(experiment, folder, metrics, {} if task is None else task.result(), failure)
         try:
             if failure is not None:
                 kind = "limit" if isinstance(failure, StoppedError) else "stop"
@@ -195,7 +198,11 @@ def _start_message(offset: float) -> tuple[str, str]:
 
 
 def _summary(
-    experiment: Experiment, folder: RunFolder, metrics: Metrics, failure: TcrctlError | None
+    experiment: Experiment,
+    folder: RunFolder,
+    metrics: Metrics,
+    task: dict[str, Any],
+    failure: TcrctlError | None,
 ) -> Summary:
     spec = experiment.spec
     summary = Summary(
@@ -210,6 +217,7 @@ def _summary(
         measures=metrics.measures(),
         criteria=(),
         log=folder.path / LOG,
+        task=task,
     )
     verdicts = judge(spec.criteria, summary.as_json())
     status, reason, exit_code = _outcome(failure, verdicts)

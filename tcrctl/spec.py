@@ -25,8 +25,9 @@ from tcrctl.robot.sections import Name
 from tcrctl.settings import Path as Keys
 from tcrctl.settings import Settings, quantity, refuse
 from tcrctl.summary import TASK, UNITS
+from tcrctl.task.settings import TaskSettings
 from tcrctl.trajectory.drive_settings import DrivesSettings
-from tcrctl.trajectory.settings import TrajectorySettings
+from tcrctl.trajectory.settings import TrajectorySettings, named_targets
 
 
 class LogSettings(Settings):
@@ -65,6 +66,7 @@ class ExperimentSpec(Settings):
     controller: ControllerSettings
     estimator: EstimatorSettings = PassiveObserverSettings(kind="passive_observer")
     plant: PlantSettings
+    task: TaskSettings | None = Field(default=None, description="what the run is for, if it has a task")
     criteria: tuple[CriterionText, ...] = Field(
         default=(), description="what the run must achieve, else exit code 3"
     )
@@ -79,10 +81,12 @@ class ExperimentSpec(Settings):
 
 
 def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+    results = [*UNITS, *(TASK + name for name in (spec.task.result_names if spec.task else ()))]
     for i, criterion in enumerate(spec.criteria):
-        if criterion.name not in UNITS and not criterion.name.startswith(TASK):
-            known = ", ".join(difflib.get_close_matches(criterion.name, UNITS, n=3, cutoff=0.3) or UNITS)
-            yield ("criteria", i), f"a run has no result {criterion.name}; known: {known}, {TASK}..."
+        if criterion.name not in results:
+            known = ", ".join(difflib.get_close_matches(criterion.name, results, n=3, cutoff=0.3) or results)
+            yield ("criteria", i), f"a run has no result {criterion.name}; known: {known}"
+    yield from _target_disagreements(spec)
     if spec.controller.kind == "open_loop" and spec.trajectory.kind != "drives":
         yield (
             ("trajectory", "kind"),
@@ -95,6 +99,15 @@ def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
     if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
         what = f"{period:g} s must be a whole number of steps; with {step:g} ms it is {steps:g}"
         yield ("plant", "step_ms"), f"a control period of {what}"
+
+
+def _target_disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+    targets = spec.task.target_names if spec.task else ()
+    for keys, name in named_targets(spec.trajectory):
+        if spec.task is None:
+            yield ("trajectory", *keys), f"there is no task with a target {name}; the experiment has none"
+        elif name not in targets:
+            yield ("trajectory", *keys), f"the task has no target {name}; it has {', '.join(targets)}"
 
 
 def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:

@@ -36,7 +36,14 @@ UNITS: Final[Mapping[str, str]] = {
 TASK: Final = "task."
 """Names that begin so are values that the task of the experiment defines."""
 
+_SUFFIXES: Final = {"mm": "mm", "rad": "rad", "deg": "deg", "s": "s"}
+
 Numbers = dict[str, float] | None
+
+
+def unit_of(name: str) -> str:
+    """Unit of a value of the result by its dotted name; names of a task's values end in theirs."""
+    return UNITS.get(name) or (_SUFFIXES.get(name.rpartition("_")[2], "") if name.startswith(TASK) else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +71,8 @@ class Verdict:
         return {name: getattr(self, name) for name in ("name", "limit", "value", "unit", "passed")}
 
     def __str__(self) -> str:
-        value = "unknown" if self.value is None else f"{self.value:.4g} {self.unit}".rstrip()
-        return f"{self.name} is {value}, must be {self.relation} {self.limit:g}"
+        value = "unknown" if self.value is None else f"{_shown(self.value, '.4g')} {self.unit}".rstrip()
+        return f"{self.name} is {value}, must be {self.relation} {_shown(self.limit, 'g')}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +161,10 @@ class Summary:
         return made
 
 
+def _shown(value: float | bool, form: str) -> str:
+    return str(value).lower() if isinstance(value, bool) else format(value, form)
+
+
 def judge(criteria: Sequence[Criterion], result: Mapping[str, Any]) -> tuple[Verdict, ...]:
     """Compare every criterion with the value it names.
 
@@ -170,7 +181,7 @@ def _verdict(criterion: Criterion, value: float | bool | None) -> Verdict:
         criterion.relation,
         criterion.limit,
         value,
-        UNITS.get(criterion.name, ""),
+        unit_of(criterion.name),
         value is not None and criterion.holds(value),
     )
 

@@ -38,8 +38,8 @@ def drawing(*strokes, **keys):
     return parsed({"kind": "strokes", "strokes": list(strokes), "corner_angle_deg": 0, **keys})
 
 
-def built(section):
-    return build_trajectory(section, AT_REST)
+def built(section, targets=None):
+    return build_trajectory(section, AT_REST, targets or {})
 
 
 def at_start(x, y, **keys):

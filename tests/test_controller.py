@@ -14,7 +14,7 @@ from tcrctl.controller.controller import build_controller
 from tcrctl.controller.cost import outputs
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.multi_step import MultiStep, block_edges, superpose
-from tcrctl.controller.settings import CostWeights, IntegralSettings, IocSettings
+from tcrctl.controller.settings import CostWeights, IntegralSettings, IocSettings, KinematicSettings
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.plant.settings import Mismatch, SimulatedSettings
@@ -24,12 +24,25 @@ from tcrctl.robot.equations import make_workspace
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.signals import Command, Estimate, Reference
 
-PREDICTIONS = ["multi_step", "one_step", "literal"]
+#: Keys of ``controller:`` for every way to predict.
+PREDICTIONS = {
+    "multi_step": {"prediction": "multi_step", "horizon_s": 0.8},
+    "one_step": {"prediction": "one_step", "horizon_s": 0.4},
+    "literal": {"prediction": "literal", "horizon_s": 0.05},
+    "static": {"prediction": "multi_step", "horizon_s": 0.8, "model": "static"},
+    "static literal": {"prediction": "literal", "horizon_s": 0.05, "model": "static"},
+}
+
+
+KINDS = [*PREDICTIONS, "kinematic"]
+
+
+def settings_of(kind, **changes):
+    return KinematicSettings(kind="kinematic", **changes) if kind == "kinematic" else ioc(kind, **changes)
 
 
 def ioc(prediction="multi_step", **changes) -> IocSettings:
-    horizon = {"multi_step": 0.8, "one_step": 0.4, "literal": 0.05}[prediction]
-    return IocSettings(kind="ioc", prediction=prediction, **{"horizon_s": horizon, **changes})
+    return IocSettings(kind="ioc", **{**PREDICTIONS[prediction], **changes})
 
 
 def pose_settings(**changes) -> IocSettings:
@@ -88,9 +101,9 @@ def closed_loop(robot, settings, offset, seconds, mismatch=None, noise=0.0, late
     return np.array(errors), np.array(speeds), infos
 
 
-@pytest.mark.parametrize("prediction", PREDICTIONS)
-def test_on_target_at_rest_nothing_moves(tcr600, prediction):
-    controller = build_controller(ioc(prediction), tcr600)
+@pytest.mark.parametrize("kind", KINDS)
+def test_on_target_at_rest_nothing_moves(tcr600, kind):
+    controller = build_controller(settings_of(kind), tcr600)
     command, info = controller.control(resting(tcr600), constant(tcr600, controller))
     assert info.converged
     assert np.max(np.abs(command.speed)) < 2e-5
@@ -116,9 +129,9 @@ def test_at_the_end_of_the_stroke_no_command_leads_beyond(tcr600):
         assert np.all(command.drive >= low - 1e-12)
 
 
-@pytest.mark.parametrize("prediction", PREDICTIONS)
-def test_a_doubtful_estimate_holds_the_drives_and_says_so(tcr600, prediction):
-    controller = build_controller(ioc(prediction), tcr600)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_doubtful_estimate_holds_the_drives_and_says_so(tcr600, kind):
+    controller = build_controller(settings_of(kind), tcr600)
     estimate = replace(resting(tcr600), converged=False)
     command, info = controller.control(estimate, constant(tcr600, controller, (0.01, 0.0, 0.02)))
     assert not info.converged
@@ -127,9 +140,9 @@ def test_a_doubtful_estimate_holds_the_drives_and_says_so(tcr600, prediction):
     assert np.array_equal(command.drive, estimate.drive)
 
 
-@pytest.mark.parametrize("prediction", PREDICTIONS)
-def test_a_state_that_is_not_finite_holds_the_drives(tcr600, prediction):
-    controller = build_controller(ioc(prediction), tcr600)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_state_that_is_not_finite_holds_the_drives(tcr600, kind):
+    controller = build_controller(settings_of(kind), tcr600)
     estimate = resting(tcr600)
     estimate.q[50] = np.nan
     command, info = controller.control(estimate, constant(tcr600, controller))

@@ -333,7 +333,7 @@ GOOD = {
     ("kind", "change", "said"),
     [
         ("waypoints", {"points": []}, "at least 1 item"),
-        ("waypoints", {"points": [{}]}, "exactly one of offset_mm, position_mm; given: none"),
+        ("waypoints", {"points": [{}]}, "exactly one of offset_mm, position_mm, target; given: none"),
         (
             "waypoints",
             {"points": [{"offset_mm": [0, 0, 0], "position_mm": [0, 0, 0]}]},

@@ -17,11 +17,13 @@ from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
+from tcrctl.cli.paper import paper
 from tcrctl.cli.recover import recover
 from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
+from tcrctl.cli.stability import stability
 from tcrctl.cli.validate import validate
 from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
@@ -32,10 +34,12 @@ VERBS: dict[str, Callable[..., None]] = {
     "validate": validate,
     "new": new,
     "schema": schema,
+    "stability": stability,
     "info": info,
     "recover": recover,
     "export": export,
     "emulate": emulate,
+    "paper": paper,
 }
 
 

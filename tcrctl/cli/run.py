@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tcrctl.cli.options import AsJson, Overrides, Spec
+from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from tcrctl.experiment import Experiment, Notify
@@ -102,7 +101,7 @@ def _get_ready(out: Path) -> None:
 def _run(experiment: Experiment, out: Path, realtime: bool, say: Notify, *, quiet: bool) -> Summary:
     from tcrctl.run import run_experiment
 
-    with _progress_bar(experiment.spec.name, shown=not quiet) as progress:
+    with progress_bar(experiment.spec.name, shown=not quiet) as progress:
         return run_experiment(
             experiment, out=out, realtime=realtime, confirmed=True, notify=say, progress=progress
         )
@@ -138,21 +137,6 @@ def _headline(loaded: LoadedSpec) -> str:
     spec = loaded.spec
     parts = f"robot {loaded.robot.name}, plant {spec.plant.kind}, controller {spec.controller.kind}"
     return f"{spec.name}: {parts}, {1.0 / spec.controller.period_s:.4g} Hz"
-
-
-@contextmanager
-def _progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], None]]:
-    """A bar on stderr if that is a terminal; else nothing."""
-    if not (shown and sys.stderr.isatty()):
-        yield lambda done, total: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(name, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def _plan_json(experiment: Experiment, path: StaticPath | None) -> dict[str, Any]:

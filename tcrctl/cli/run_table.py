@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tcrctl.summary import Numbers, Summary
@@ -32,9 +32,36 @@ def rows(summary: Summary) -> Iterator[Row]:
     if measures.overruns or measures.unconverged_steps:
         text = f"{measures.overruns} overruns, {measures.unconverged_steps} unconverged steps"
         yield "trouble", text, "yellow"
+    for text in _task(summary.task):
+        yield "task", text, ""
     for verdict in summary.criteria:
         result = "passed" if verdict.passed else "FAILED"
         yield "criterion", f"{result}: {verdict}", "green" if verdict.passed else "red"
+
+
+def _task(task: Mapping[str, Any]) -> Iterator[str]:
+    """One line per thing that the task lists, then its other values in one."""
+    for items in task.values():
+        for item in items if isinstance(items, list) else ():
+            rest = {key: value for key, value in item.items() if key != "name"}
+            yield f"{item['name']}: {_values(rest)}"
+    single = {key: value for key, value in task.items() if not isinstance(value, list)}
+    if single:
+        yield _values(single)
+
+
+def _values(values: Mapping[str, Any]) -> str:
+    return ", ".join(_value(key, value) for key, value in values.items() if value is not None)
+
+
+def _value(key: str, value: Any) -> str:
+    """``beam passes yes``, ``dwell 5.25 s``: a key that ends in its unit gives it to the number."""
+    if isinstance(value, bool):
+        return f"{key.replace('_', ' ')} {'yes' if value else 'no'}"
+    if isinstance(value, float):
+        name, _, unit = key.rpartition("_")
+        return f"{name.replace('_', ' ')} {value:.4g} {unit}"
+    return f"{key.replace('_', ' ')} {value}"
 
 
 def _numbers(numbers: Numbers, unit: str) -> str:

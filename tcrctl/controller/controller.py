@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
+from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.instantaneous import InstantaneousOptimalControl
+from tcrctl.controller.kinematic import Kinematic
 from tcrctl.controller.literal import LiteralIoc
 from tcrctl.controller.open_loop import OpenLoop
-from tcrctl.controller.settings import ControllerSettings, OpenLoopSettings
+from tcrctl.controller.settings import ControllerSettings, KinematicSettings, OpenLoopSettings
+from tcrctl.memory import Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
@@ -25,11 +29,21 @@ class Controller(Protocol):
         """Command for the coming period, within speed and stroke limits, and how it was found."""
         ...
 
+    def memory(self) -> Mapping[str, Kept]:
+        """What the next command depends on; see :class:`tcrctl.memory.Remembers`."""
+        ...
+
+    def inner_map(self) -> InnerMap | None:
+        """The iteration of the last step; None if there is none, or it did not end in a solution."""
+        ...
+
 
 def build_controller(settings: ControllerSettings, robot: Robot) -> Controller:
     """Build the controller of a ``controller:`` section."""
     if isinstance(settings, OpenLoopSettings):
         return OpenLoop(settings, robot)
+    if isinstance(settings, KinematicSettings):
+        return Kinematic(settings, robot)
     if settings.prediction == "literal":
         return LiteralIoc(settings, robot)
     return InstantaneousOptimalControl(settings, robot)

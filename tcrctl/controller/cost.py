@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tcrctl.controller.ioc import Weights
-from tcrctl.controller.settings import IocSettings
+from tcrctl.controller.settings import IocSettings, KinematicSettings
 from tcrctl.robot import pose
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
@@ -49,7 +49,9 @@ def make_target(settings: IocSettings, reference: Reference, shift: Array, m: in
     return target
 
 
-def input_limits(settings: IocSettings, robot: Robot, drive: Array, blocks: int) -> tuple[Array, Array]:
+def input_limits(
+    settings: IocSettings | KinematicSettings, robot: Robot, drive: Array, blocks: int
+) -> tuple[Array, Array]:
     """Hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
     limit = settings.speed_limit_mm_s / 1000.0
     low, high = np.full(blocks * drive.shape[0], -limit), np.full(blocks * drive.shape[0], limit)

@@ -11,20 +11,24 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from tcrctl.controller.cost import input_limits, make_target, make_weights, outputs, pose_error
+from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.ioc import Solution, build_ioc, solve_ioc
 from tcrctl.controller.multi_step import MultiStep
 from tcrctl.controller.one_step import OneStep
 from tcrctl.controller.predictor import Forecast, Predictor
 from tcrctl.controller.settings import IocSettings
+from tcrctl.controller.static import Static
+from tcrctl.memory import SPEED, Kept
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
-#: Choice of prediction by name.
-PREDICTORS: Mapping[str, Callable[[IocSettings, Robot], Predictor]] = {
-    "multi_step": MultiStep,
-    "one_step": OneStep,
+#: Choice of prediction by the names of model and prediction.
+PREDICTORS: Mapping[tuple[str, str], Callable[[IocSettings, Robot], Predictor]] = {
+    ("dynamic", "multi_step"): MultiStep,
+    ("dynamic", "one_step"): OneStep,
+    ("static", "multi_step"): Static,
 }
 
 #: Largest violation of the LCP conditions accepted; their rows are speeds [m/s] and tensions [N].
@@ -43,18 +47,32 @@ class InstantaneousOptimalControl:
 
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
         self._settings, self._robot = settings, robot
-        self._predictor = PREDICTORS[settings.prediction](settings, robot)
+        self._predictor = PREDICTORS[settings.model, settings.prediction](settings, robot)
         self._weights = make_weights(settings, robot.n_cables, self._predictor.ahead.size)
         self._integral = IntegralAction(settings.integral, settings.period_s)
+        self._normal = robot.rest_normal if settings.output == "pose" else None
         self._speed = np.zeros(robot.n_cables)
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
         self.ahead = self._predictor.ahead
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Last input, integral action, and what the predictor keeps."""
+        return {
+            "speed": Kept(self._speed, SPEED),
+            **self._integral.memory(self._normal),
+            **self._predictor.memory(),
+        }
+
+    def inner_map(self) -> InnerMap | None:
+        """Newton's iteration of the last prediction; the one LCP comes after it and is not fed back."""
+        return self._predictor.inner_map()
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Command for the coming period; the drives are held if no trustworthy one was found."""
         age = reference.t - estimate.t
         now = outputs(estimate, age, self._robot)
         error = pose_error(reference, now[:3], now[3:6])
+        self._normal = now[3:6].copy() if self._settings.output == "pose" else None
         shift = self._integral.update(error, bool(self._saturated.any()))
         forecast = self._predictor.predict(estimate, age, now, self._speed)
         low, high = input_limits(self._settings, self._robot, estimate.drive, self._predictor.blocks)
@@ -90,6 +108,8 @@ def _doubt(estimate: Estimate, forecast: Forecast) -> str:
     """Empty, or why no command can be built on this step."""
     if not estimate.converged:
         return "the estimator's step did not converge"
+    if not np.isfinite(estimate.q).all():
+        return "the estimate is not finite"
     if not forecast.converged:
         return forecast.reason
     if not (np.isfinite(forecast.prediction.free).all() and np.isfinite(forecast.prediction.gain).all()):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from tcrctl.controller.settings import IntegralSettings
+from tcrctl.memory import NORMAL, POSITION, Kept
 from tcrctl.signals import Array
 
 
@@ -22,6 +24,15 @@ class IntegralAction:
         self._rate = 0.0 if settings is None else settings.gain_1_s * period
         mm, deg = (0.0, 0.0) if settings is None else (settings.limit_mm, settings.limit_deg)
         self._limit = np.repeat([mm / 1000.0, math.radians(deg)], 3)
+
+    def memory(self, normal: Array | None) -> Mapping[str, Kept]:
+        """The shift of the position, and of the ``normal`` (3,) if that is tracked; nothing while it is off."""
+        if self._rate == 0.0:
+            return {}
+        position = {"integral_position": Kept(self.shift[:3], POSITION)}
+        if normal is None:
+            return position
+        return {**position, "integral_normal": Kept(self.shift[3:], NORMAL, blind=normal)}
 
     def update(self, error: Array, saturated: bool) -> Array:
         """Add one period of ``error`` (6,) = wanted - measured; returns the shift.

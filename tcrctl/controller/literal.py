@@ -1,5 +1,8 @@
 """Algorithm 1 as printed (with the corrections of REFERENCES.md): one generalized-alpha step of one period.
 
+With ``model: static`` the first equation of (9) is degraded to its static form, as in Sec. V.E: the same iteration
+then finds an equilibrium, and nothing but the drives and the last input is left of the state.
+
 Positions and inputs are iterated together, (28): linearise the step at z^(j), solve the LCP for u, take the
 full Newton step. It is kept to show what the multi-step controller is for: in one period the soft modes do not
 answer, so the algorithm misjudges its authority.
@@ -7,15 +10,21 @@ answer, so the algorithm misjudges its authority.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import NamedTuple
+
 import numpy as np
 
 from tcrctl.controller.cost import input_limits, make_target, make_weights, pose_error
+from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.ioc import Prediction, Solution, build_ioc, solve_ioc
 from tcrctl.controller.settings import IocSettings
+from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.numerics.generalized_alpha import coefficients
 from tcrctl.robot import dynamics, linear, pose
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, assemble, make_workspace
+from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.model import FIXED
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
@@ -25,6 +34,26 @@ from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 EPSILON = 2e-6
 RHO = 0.8
 MAX_ITERATIONS = 30
+
+
+class Fixed(NamedTuple):
+    """What stays as it is while one step is iterated.
+
+    Attributes:
+        drive: Drive lengths at its start (m,) [m].
+        load: Integration rule.
+        target: Outputs wanted (1, 7 + m).
+        previous: Input of the step before (m,) [m/s].
+        low: Lower limits of the input (m,) [m/s].
+        high: Upper limits (m,) [m/s].
+    """
+
+    drive: Array
+    load: Load
+    target: Array
+    previous: Array
+    low: Array
+    high: Array
 
 
 class LiteralIoc:
@@ -40,12 +69,16 @@ class LiteralIoc:
         self._integral = IntegralAction(settings.integral, settings.period_s)
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._gain = np.zeros((self._work.r.shape[0], robot.n_cables))
+        self._normal = robot.rest_normal if settings.output == "pose" else None
         self._speed = np.zeros(robot.n_cables)
+        self._last: tuple[Array, Array, Fixed] | None = None
         self.ahead = np.array([settings.period_s])
 
     def _load(self, estimate: Estimate, v: Array) -> tuple[Array, Load]:
-        """Predictor positions and load of the step (12)-(14) with zero acceleration at its start."""
+        """Start positions and load of the step (12)-(14) with zero acceleration at its start; or of statics."""
         h, s, robot = self._settings.period_s, self._scratch, self._robot
+        if self._settings.model == "static":
+            return estimate.q.copy(), static_load(robot.model, robot.weight)
         c = coefficients(RHO, h)
         inertia = c.acceleration + robot.model.damping * c.velocity
         q0 = estimate.q + h * v
@@ -54,7 +87,8 @@ class LiteralIoc:
         dynamics.lengths_before(
             robot.model, estimate.q, v, estimate.drive, self._speed, 0.5 * h, s, self._work
         )
-        return q0, Load(inertia, 2.0 / h, s.nodal, s.bar_before, s.cable_before)
+        own = (array.copy() for array in (s.nodal, s.bar_before, s.cable_before))
+        return q0, Load(inertia, 2.0 / h, *own)
 
     def _linearise(self, q: Array, drive: Array, load: Load, speed: Array) -> tuple[Array, Prediction]:
         """Newton step (12 n_modules,) at the present input, and the outputs as (31)."""
@@ -74,24 +108,58 @@ class LiteralIoc:
         now[POSE_ROWS:] += ws.axial * (ws.G[:, 3 * FIXED :] @ step)
         return step, Prediction((now - gain[0] @ speed)[None], gain)
 
+    def _iterate(self, q: Array, speed: Array, fixed: Fixed) -> tuple[Array, Solution]:
+        """(28) with (36): change of the free coordinates (12 n_modules,), and the new input with proof."""
+        h = self._settings.period_s
+        step, prediction = self._linearise(q, fixed.drive + h * speed, fixed.load, speed)
+        problem = build_ioc(prediction, fixed.target, fixed.previous, fixed.low, fixed.high, self._weights)
+        solution = Solution(*solve_ioc(problem, prediction, self._weights))
+        return step + h * (self._gain @ (solution.inputs - speed)), solution
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Last input and integral action."""
+        return {"speed": Kept(self._speed, SPEED), **self._integral.memory(self._normal)}
+
+    def inner_map(self) -> InnerMap | None:
+        """(43) about the solution of the last step.
+
+        z are the free coordinates and the input, which stands for the actuation nodes (20). The multipliers of
+        (22) enter it linearly, so z^(j+1) does not depend on theirs: they only add eigenvalues 0.
+        """
+        if self._last is None:
+            return None
+        q, speed, fixed = self._last
+        first, size = 3 * FIXED, q.size - 3 * FIXED
+
+        def apply(z: Array) -> Array:
+            moved = q.copy()
+            moved[first:] = z[:size]
+            change, solution = self._iterate(moved, z[size:], fixed)
+            return np.concatenate([z[:size] + change, solution.inputs])
+
+        scale = np.concatenate([np.full(size, POSITION), np.full(speed.size, SPEED)])
+        return InnerMap(
+            "(28) with (36): Newton and LCP together", np.concatenate([q[first:], speed]), scale, apply
+        )
+
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Command for the coming period; the drives are held if (41) was not reached."""
         h, m = self._settings.period_s, self._robot.n_cables
-        error = pose_error(reference, estimate.position, estimate.normal)
-        target = make_target(self._settings, reference, self._integral.update(error, False), m)
+        self._normal = estimate.normal if self._settings.output == "pose" else None
+        shift = self._integral.update(pose_error(reference, estimate.position, estimate.normal), False)
         low, high = input_limits(self._settings, self._robot, estimate.drive, 1)
         q, load = self._load(estimate, estimate.v)
+        target = make_target(self._settings, reference, shift, m)
+        fixed = Fixed(estimate.drive.copy(), load, target, self._speed, low, high)
         speed, change, iteration = self._speed, np.inf, 0
         solution = Solution(speed, np.inf, 0, False, 0)
         while change > EPSILON and iteration < MAX_ITERATIONS and np.all(np.isfinite(q)):
-            step, prediction = self._linearise(q, estimate.drive + h * speed, load, speed)
-            problem = build_ioc(prediction, target, self._speed, low, high, self._weights)
-            solution = Solution(*solve_ioc(problem, prediction, self._weights))
-            moved = step + h * (self._gain @ (solution.inputs - speed))
+            moved, solution = self._iterate(q, speed, fixed)
             q[3 * FIXED :] += moved
             speed, iteration = solution.inputs, iteration + 1
             change = float(np.linalg.norm(moved) / np.linalg.norm(q))
         good = change <= EPSILON and solution.solved and estimate.converged
+        self._last = (q, speed, fixed) if good else None
         self._speed = np.clip(speed, low, high) if good else np.zeros(m)
         info = ControlInfo(
             converged=good,

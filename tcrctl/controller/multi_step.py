@@ -13,14 +13,17 @@ the lightly damped lateral mode out of Δ. See docs/control.md.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.predictor import Forecast
 from tcrctl.controller.settings import IocSettings
+from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
@@ -92,17 +95,29 @@ class Memory(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _follow(model: Model, load: Load, ws: Workspace, memory: Memory, drive: Array) -> Outcome:
-    """Move the model's equilibrium to ``drive``, starting where its static gain points to."""
-    q = memory.equilibrium.copy()
-    for k in range(memory.gain.shape[0]):
+def follow(
+    model: Model, load: Load, ws: Workspace, equilibrium: Array, drive: Array, gain: Array, wanted: Array
+) -> Outcome:
+    """Move the model's equilibrium to other drives, starting where its static gain points to.
+
+    Args:
+        model: Robot arrays.
+        load: Static load.
+        ws: Workspace; afterwards it belongs to the new equilibrium.
+        equilibrium: q_eq (3 n_nodes,) [m], moved.
+        drive: Drives it belongs to (m,) [m], moved.
+        gain: ∂q_eq/∂d (12 n_modules, m) with the taut cables, moved.
+        wanted: The new drives (m,) [m].
+    """
+    q = equilibrium.copy()
+    for k in range(gain.shape[0]):
         for c in range(drive.shape[0]):
-            q[3 * FIXED + k] += memory.gain[k, c] * (drive[c] - memory.drive[c])
-    outcome = minimise(model, q, drive, load, ws, TOLERANCE, int(MAX_ITERATIONS), bool(1))
+            q[3 * FIXED + k] += gain[k, c] * (wanted[c] - drive[c])
+    outcome = minimise(model, q, wanted, load, ws, TOLERANCE, int(MAX_ITERATIONS), bool(1))
     if outcome.converged:
-        memory.equilibrium[:], memory.drive[:] = q, drive
+        equilibrium[:], drive[:] = q, wanted
         linear.couple(ws, ws.r)
-        linear.drive_gain(ws, memory.gain)
+        linear.drive_gain(ws, gain)
     return outcome
 
 
@@ -159,7 +174,7 @@ def forecast(
     Returns:
         Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m).
     """  # fmt: skip
-    outcome = _follow(model, load, ws, memory, drive)
+    outcome = follow(model, load, ws, memory.equilibrium, memory.drive, memory.gain, drive)
     deviation, away, finite = np.empty(q.shape[0]), np.empty(q.shape[0]), True
     for k in range(q.shape[0]):
         deviation[k] = q[k] - memory.equilibrium[k]
@@ -206,10 +221,30 @@ class MultiStep:
             MAX_ITERATIONS,
             True,
         )
+        self._solved = False
         basis = response.start_basis(robot.model, self._work, settings.modes)
         self._memory = Memory(
             rest.copy(), np.zeros(robot.n_cables), robot.rest.gain.copy(), still, still.copy(), basis
         )
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Offset and last velocities without the fixed base, if the offset moves.
+
+        The basis is left out: it turns within the modes it spans, which changes no response, and with nothing
+        left to correct an error of it has no effect of first order.
+        """
+        if self._blend == 0.0:
+            return {}
+        first = 3 * FIXED
+        return {
+            "offset": Kept(self._memory.offset[first:], POSITION),
+            "last_v": Kept(self._memory.v[first:], SPEED),
+        }
+
+    def inner_map(self) -> InnerMap | None:
+        """Newton's iteration of the statics at the present drives."""
+        what, at = "Newton on the statics; one LCP after it, not fed back", self._memory
+        return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
     def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""
@@ -222,4 +257,5 @@ class MultiStep:
         outcome = Outcome(*outcome)
         good = outcome.converged and stable
         reason = "" if good else "the model has no stable equilibrium at the present drives"
+        self._solved = outcome.converged
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason)

@@ -6,11 +6,15 @@ end. Backward Euler over a long step damps the slow modes, which makes this pred
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.predictor import Forecast
 from tcrctl.controller.settings import IocSettings
+from tcrctl.memory import Kept
 from tcrctl.robot import dynamics, linear, pose
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, make_workspace
 from tcrctl.robot.potential import Outcome, minimise
@@ -32,7 +36,17 @@ class OneStep:
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._gain = np.zeros((self._work.r.shape[0], robot.n_cables))
         self._column = np.zeros(self._work.r.shape[0])
+        self._last: tuple[Load, Array] | None = None
         self._guess = robot.rest.q.copy()
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Nothing: the guess is where the iteration starts, not where it ends."""
+        return {}
+
+    def inner_map(self) -> InnerMap | None:
+        """Newton's iteration of the backward-Euler step with the last input held."""
+        what = "Newton on the backward-Euler step; one LCP after it, not fed back"
+        return None if self._last is None else newton_map(what, self._robot, *self._last, self._guess)
 
     def _load(self, q: Array, v: Array, drive: Array) -> Load:
         """Backward Euler over the horizon from (q, v, d)."""
@@ -53,6 +67,7 @@ class OneStep:
         outcome = Outcome(
             *minimise(self._robot.model, q, drive, load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         )
+        self._last = (load, drive) if outcome.converged else None
         if outcome.converged:
             self._guess = q
         linear.solve(self._work, self._work.r, self._column)

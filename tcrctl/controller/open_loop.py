@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from tcrctl.controller.settings import OpenLoopSettings
 from tcrctl.errors import InputError
+from tcrctl.memory import Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
@@ -23,6 +26,13 @@ class OpenLoop:
         self._period, self._limit = settings.period_s, settings.speed_limit_mm_s / 1000.0
         self._stroke = robot.stroke
         self.ahead = np.array([settings.period_s])
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Nothing is remembered."""
+        return {}
+
+    def inner_map(self) -> None:
+        """Nothing is iterated."""
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Command that brings the drives to their lengths by the end of the period, within the limits.

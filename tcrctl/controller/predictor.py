@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.ioc import Prediction
+from tcrctl.memory import Kept
 from tcrctl.signals import Array, Estimate
 
 
@@ -48,4 +51,12 @@ class Predictor(Protocol):
             now: Outputs (7 + m,) as they should be now.
             speed: The last input (m,) [m/s].
         """
+        ...
+
+    def memory(self) -> Mapping[str, Kept]:
+        """What the next prediction depends on; see :class:`tcrctl.memory.Remembers`."""
+        ...
+
+    def inner_map(self) -> InnerMap | None:
+        """The iteration of the last prediction; None if it did not end in a solution."""
         ...

@@ -66,6 +66,11 @@ class IocSettings(Settings):
     output: Literal["position", "pose"] = Field(default="position", description="what is tracked")
     period_s: float = quantity("s", "control period", 0.05, gt=0, le=10)
     horizon_s: float = quantity("s", "prediction horizon, at least one period", 0.8, gt=0, le=60)
+    model: Literal["dynamic", "static"] = Field(
+        default="dynamic",
+        description="dynamic: the equations of motion; static: their static form, the end follows the drives "
+        "at once",
+    )
     prediction: Literal["multi_step", "one_step", "literal"] = Field(
         default="multi_step",
         description="multi_step: linear response over the horizon; one_step: one backward-Euler step as long "
@@ -106,6 +111,9 @@ class IocSettings(Settings):
     def _disagreements(self) -> Iterator[tuple[Path, str]]:
         if self.horizon_s < self.period_s:
             yield ("horizon_s",), f"must be at least period_s, {self.period_s:g}, not {self.horizon_s:g}"
+        if self.model == "static" and self.prediction == "one_step":
+            what = "one_step is a time step of the equations of motion; statics go with multi_step or literal"
+            yield ("prediction",), what
         if self.prediction == "multi_step" and self.horizon_s / self.instants > 0.25:
             yield ("instants",), "must be so many that instants lie at most 0.25 s apart"
         if self.prediction == "multi_step" and self.blocks > self.instants:
@@ -118,6 +126,31 @@ class IocSettings(Settings):
             yield ("weights", "normal"), "must be > 0 with output: pose, or the normal is not tracked"
 
 
+class SlackGuard(Settings):
+    """Moves that leave the end where it is, by the model, bring the tensions towards a reference."""
+
+    reference_n: float = quantity("N", "tension that every cable is drawn to", 5.0, gt=0)
+    gain_1_s: float = quantity("1/s", "part of the difference that is removed per second", 0.5, gt=0)
+
+
+class KinematicSettings(Settings):
+    """Baseline for comparisons: resolved rates with the damped pseudo-inverse of the static map."""
+
+    kind: Literal["kinematic"]
+    output: Literal["position", "pose"] = Field(default="position", description="what is tracked")
+    period_s: float = quantity("s", "control period", 0.05, gt=0, le=10)
+    gain_1_s: float = quantity("1/s", "part of the measured error that is removed per second", 0.3, ge=0)
+    integral: OrOff[IntegralSettings] = Field(default=None, description="integral action, or off")
+    damping: float = quantity("m/m", "damping of the pseudo-inverse", 0.05, ge=0)
+    lever_mm: float = quantity(
+        "mm", "length that makes a change of the normal comparable with one of the position", 100.0, gt=0
+    )
+    tension: OrOff[SlackGuard] = Field(
+        default=SlackGuard(), description="keeps cables taut where the pose leaves a choice, or off"
+    )
+    speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
+
+
 class OpenLoopSettings(Settings):
     """Moves the drives to the lengths that the trajectory gives; nothing is fed back."""
 
@@ -126,5 +159,7 @@ class OpenLoopSettings(Settings):
     speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
 
 
-ControllerSettings: TypeAlias = Annotated[IocSettings | OpenLoopSettings, Field(discriminator="kind")]
+ControllerSettings: TypeAlias = Annotated[
+    IocSettings | KinematicSettings | OpenLoopSettings, Field(discriminator="kind")
+]
 """Union of all kinds of controller, told apart by ``kind``."""

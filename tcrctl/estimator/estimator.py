@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
 from tcrctl.errors import InputError
 from tcrctl.estimator.exact import ExactState, State
 from tcrctl.estimator.passive_observer import PassiveObserver
 from tcrctl.estimator.settings import EstimatorSettings, ExactSettings
+from tcrctl.memory import Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Command, Estimate, Measurement
 
@@ -17,6 +19,10 @@ class Estimator(Protocol):
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """State at the time of ``measured``, ``applied`` being the command since the last update."""
+        ...
+
+    def memory(self) -> Mapping[str, Kept]:
+        """What the next update depends on; see :class:`tcrctl.memory.Remembers`."""
         ...
 
 

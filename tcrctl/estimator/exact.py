@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from tcrctl.elements import sliding_cable
+from tcrctl.memory import Kept
 from tcrctl.robot import pose
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, Estimate, Measurement
@@ -19,6 +20,10 @@ class ExactState:
 
     def __init__(self, robot: Robot, state: State) -> None:
         self._robot, self._state = robot, state
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Nothing: the plant remembers."""
+        return {}
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Estimate without error; tensions are those of the controller's model in that shape."""

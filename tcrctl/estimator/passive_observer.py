@@ -14,12 +14,15 @@ the measured tip ring and the model's; while the tip ring is not seen, the last 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from tcrctl.estimator.settings import PassiveObserverSettings
+from tcrctl.memory import NORMAL, POSITION, SPEED, Kept
 from tcrctl.robot import dynamics, pose
 from tcrctl.robot.equations import FORCE, Q_FREE, SPRING, SPRING_AT, Load, make_workspace
-from tcrctl.robot.model import ring_rows
+from tcrctl.robot.model import FIXED, ring_rows
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, Estimate, Measurement
@@ -75,6 +78,17 @@ class PassiveObserver:
             )
         turned = normal + self._correction[3:]
         return position + self._correction[:3], turned / np.linalg.norm(turned)
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Positions and velocities without the fixed base, drives, correction of the end pose."""
+        first = 3 * FIXED
+        return {
+            "q": Kept(self._q[first:], POSITION),
+            "v": Kept(self._v[first:], SPEED),
+            "drive": Kept(self._drive, POSITION),
+            "correction_position": Kept(self._correction[:3], POSITION),
+            "correction_normal": Kept(self._correction[3:], NORMAL),
+        }
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Step the model to the time of ``measured``; the drives are those that it reports."""

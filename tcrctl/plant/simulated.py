@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 
 import numpy as np
 
 from tcrctl.errors import DivergenceError
+from tcrctl.memory import ACCELERATION, POSITION, SPEED, Kept
 from tcrctl.plant.disturbances import pushed, seen
 from tcrctl.plant.settings import Mismatch, SimulatedSettings
 from tcrctl.robot import dynamics, pose
@@ -55,6 +57,7 @@ class SimulatedPlant:
         self._latency, self._noise = settings.latency_ms / 1000.0, settings.noise_um * 1e-6
         whole = int(self._latency / period + 1e-9)  # periods; what is left of the latency is within one
         self._late = max(0.0, self._latency - whole * period)
+        self._precision: type = np.float32  # as cameras deliver them
         self._random = np.random.default_rng(seed)
         drive, rest = _start(settings, robot)
         self._state = dynamics.rest_state(rest.q, drive)
@@ -78,7 +81,7 @@ class SimulatedPlant:
         t = self.time - min(self._latency, self.time)
         return Measurement(
             t=t,
-            nodes=nodes.astype(np.float32),
+            nodes=nodes.astype(self._precision),
             valid=seen(self._valid, self._rings, self._dropouts, t),
             drive=self._state.drive.copy(),
         )
@@ -122,6 +125,23 @@ class SimulatedPlant:
     def state(self) -> tuple[Array, Array]:
         """True node positions [m] and velocities [m/s] now, (3 n_nodes,) each."""
         return self._state.q.copy(), self._state.v.copy()
+
+    def without_noise(self) -> None:
+        """Let the cameras from now on report what they see exactly, in double precision."""
+        self._noise, self._precision = 0.0, np.float64
+
+    def memory(self) -> Mapping[str, Kept]:
+        """State of the integrator without the fixed base, drives, shapes that the cameras have yet to report."""
+        first, x = 3 * FIXED, self._state
+        seen = {f"seen_{i}": Kept(q[first:], POSITION) for i, q in enumerate(self._seen)}
+        return {
+            "q": Kept(x.q[first:], POSITION),
+            "v": Kept(x.v[first:], SPEED),
+            "acceleration": Kept(x.acceleration[first:], ACCELERATION),
+            "auxiliary": Kept(x.auxiliary[first:], ACCELERATION),
+            "drive": Kept(x.drive, POSITION),
+            **seen,
+        }
 
     def close(self) -> None:
         """Nothing to leave safe in simulation."""

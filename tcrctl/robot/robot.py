@@ -43,6 +43,11 @@ class Robot:
     stroke: tuple[float, float]
     tension_limit: float
 
+    def __deepcopy__(self, memo: dict[int, object]) -> Robot:
+        """Itself: nothing in it ever changes, and the kernels know its arrays as read-only."""
+        del memo
+        return self
+
     @property
     def n_modules(self) -> int:
         """Number of free modules."""

@@ -220,7 +220,7 @@ class PosePath:
         return found
 
 
-def unit(vector: Sequence[float]) -> Array:
+def unit(vector: Sequence[float] | Array) -> Array:
     """Return a direction (3,) with length exactly 1."""
     direction = np.array(vector, dtype=float)
     scaled: Array = direction / np.linalg.norm(direction)

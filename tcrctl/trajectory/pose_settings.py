@@ -14,14 +14,16 @@ Span: TypeAlias = tuple[float, float]
 
 
 class PlaceSettings(Settings):
-    """A place of the end: exactly one of ``offset_mm`` and ``position_mm``."""
+    """A place of the end: exactly one of ``offset_mm``, ``position_mm`` and ``target``."""
 
     offset_mm: Vector | None = quantity("mm", "place minus rest end position, world frame", None)
     position_mm: Vector | None = quantity("mm", "place in the world frame", None)
+    target: str | None = Field(default=None, description="name of a target of the task, with its direction")
 
     @model_validator(mode="after")
     def _one_place(self) -> PlaceSettings:
-        check_one_of({"offset_mm": self.offset_mm, "position_mm": self.position_mm})
+        places = {"offset_mm": self.offset_mm, "position_mm": self.position_mm, "target": self.target}
+        check_one_of(places)
         return self
 
 
@@ -31,6 +33,9 @@ class WaypointSettings(PlaceSettings):
     normal: Direction | None = quantity("1", "unit end normal, +z at rest", None)
     theta_deg: tuple[float, float] | None = quantity(
         "deg", "orientation angles (theta_x, theta_y) of (45), both 0 at rest", None
+    )
+    face_target: bool = Field(
+        default=True, description="with a target: look the way it says; false leaves the orientation free"
     )
     dwell_s: NotNegative | None = quantity("s", "rest there; that of the section if left out", None)
 
@@ -44,12 +49,17 @@ class WaypointSettings(PlaceSettings):
     @model_validator(mode="after")
     def _one_orientation(self) -> WaypointSettings:
         check_one_of({"normal": self.normal, "theta_deg": self.theta_deg}, at_most=True)
+        if self.target is not None and (self.normal is not None or self.theta_deg is not None):
+            raise ValueError(
+                f"the target {self.target} has its own direction; leave out normal and theta_deg"
+            )
         return self
 
     @property
     def oriented(self) -> bool:
         """Whether the pose has an orientation."""
-        return self.normal is not None or self.theta_deg is not None
+        faces = self.target is not None and self.face_target
+        return faces or self.normal is not None or self.theta_deg is not None
 
 
 class WaypointsSettings(Settings):
@@ -134,9 +144,14 @@ class RevolutionSettings(Settings):
 class HoleSettings(PlaceSettings):
     """Where the end stops in front of a hole, and the direction into the hole."""
 
-    axis: Direction = quantity(
-        "1", "unit vector into the hole; the end looks along it, its normal against it"
+    axis: Direction | None = quantity(
+        "1", "unit vector into the hole; the end looks along it, its normal against it", None
     )
+
+    @model_validator(mode="after")
+    def _one_direction(self) -> HoleSettings:
+        check_one_of({"axis": self.axis, "target": self.target})
+        return self
 
 
 class ScanSettings(Settings):
@@ -154,7 +169,11 @@ class ScanSettings(Settings):
     turn: Literal["counter_clockwise", "clockwise"] = Field(
         default="counter_clockwise", description="sense of the turn seen against the end's normal"
     )
-    approach_s: Positive = quantity("s", "duration of the 1st stage")
+    approach_s: Positive = quantity("s", "duration of the 1st stage, without the insertion")
+    insert_mm: NotNegative = quantity(
+        "mm", "last part of the 1st stage, straight along the hole's axis with the end looking along it", 0.0
+    )
+    insert_s: NotNegative = quantity("s", "duration of the insertion", 0.0)
     tilt_s: Positive = quantity("s", "duration of the 2nd stage")
     turn_s: Positive = quantity("s", "duration of the 3rd stage, ramps included")
     return_s: Positive = quantity("s", "duration of the 4th stage")
@@ -168,4 +187,6 @@ class ScanSettings(Settings):
             raise ValueError(
                 f"ramp_s must be at most half of turn_s, {self.turn_s / 2:g}, not {self.ramp_s:g}"
             )
+        if (self.insert_mm > 0.0) != (self.insert_s > 0.0):
+            raise ValueError("give both of insert_mm and insert_s, or none")
         return self

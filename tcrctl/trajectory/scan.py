@@ -9,7 +9,7 @@ import numpy as np
 from ..numerics import rotation
 from ..robot.robot import Robot
 from ..signals import Array
-from .pose_path import EndPose, PosePath, Revolution, StraightMove, blend, rest, turn, unit
+from .pose_path import MM, EndPose, PosePath, Revolution, StraightMove, blend, rest, turn, unit
 from .pose_settings import ScanSettings
 from .waypoints import place_of
 
@@ -28,10 +28,13 @@ def build_scan(settings: ScanSettings, robot: Robot) -> PosePath:
     home = EndPose(robot.rest_position, robot.rest_normal)
     at_hole = EndPose(curve.centre, curve.frame[2])
     aside = curve.pose(0.0)
+    before = EndPose(curve.centre + MM * settings.insert_mm * curve.frame[2], curve.frame[2])
+    insertion = [blend(StraightMove(before, at_hole), settings.insert_s)] if settings.insert_s > 0.0 else []
     return PosePath.of(
         [
             rest(settings.lead_in_s),
-            blend(StraightMove(home, at_hole), settings.approach_s),
+            blend(StraightMove(home, before), settings.approach_s),
+            *insertion,
             blend(StraightMove(at_hole, aside), settings.tilt_s),
             turn(curve, settings.turn_s, settings.ramp_s),
             blend(StraightMove(aside, at_hole), settings.return_s),
@@ -42,6 +45,7 @@ def build_scan(settings: ScanSettings, robot: Robot) -> PosePath:
 
 def sweep(settings: ScanSettings, rest_position: Array) -> Revolution:
     """Return the 3rd stage: the normal once about the hole's axis, the position fixed."""
+    assert settings.hole.axis is not None
     normal = -unit(settings.hole.axis)
     start, tilt = math.radians(settings.start_deg), math.radians(settings.tilt_deg)
     sense = 1.0 if settings.turn == "counter_clockwise" else -1.0

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from ..settings import Settings, quantity
+from ..settings import Path, Settings, quantity
 from .drive_settings import DrivesSettings
-from .pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
+from .pose_settings import PlaceSettings, RevolutionSettings, ScanSettings, WaypointsSettings
 from .values import NotNegative, Positive, Vector, check_one_of, not_empty
 
 JOIN_TOLERANCE_MM = 1e-6
@@ -170,3 +171,16 @@ TrajectorySettings: TypeAlias = Annotated[
     StrokesSettings | HoldSettings | WaypointsSettings | RevolutionSettings | ScanSettings | DrivesSettings,
     Field(discriminator="kind"),
 ]
+
+
+def named_targets(settings: TrajectorySettings) -> Iterator[tuple[Path, str]]:
+    """Yield path and name of every target that a ``trajectory:`` section asks for."""
+    if isinstance(settings, ScanSettings):
+        places: list[tuple[Path, PlaceSettings]] = [(("hole",), settings.hole)]
+    elif isinstance(settings, WaypointsSettings):
+        places = [(("points", i), point) for i, point in enumerate(settings.points)]
+    else:
+        places = []
+    for path, place in places:
+        if place.target is not None:
+            yield (*path, "target"), place.target

@@ -15,6 +15,7 @@ from .revolution import build_revolution
 from .scan import build_scan
 from .settings import TrajectorySettings
 from .strokes import build_strokes
+from .targets import Targets, with_targets
 from .waypoints import build_waypoints
 
 
@@ -54,18 +55,21 @@ BUILDERS: Mapping[str, Callable[[Any, Robot], Trajectory]] = {
     "drives": build_drives,
 }
 
+NO_TARGETS: Targets = {}
 
-def build_trajectory(settings: TrajectorySettings, robot: Robot) -> Trajectory:
+
+def build_trajectory(settings: TrajectorySettings, robot: Robot, targets: Targets = NO_TARGETS) -> Trajectory:
     """Build the trajectory that a ``trajectory:`` section describes.
 
     Args:
         settings: The checked section.
         robot: The robot that the controller knows; paths start at its rest pose.
+        targets: The poses that the section asks for by name.
 
     Raises:
         NoEquilibriumError: If drive lengths are given with which the robot has no stable shape.
     """
-    return BUILDERS[settings.kind](settings, robot)
+    return BUILDERS[settings.kind](with_targets(settings, targets), robot)
 
 
 def sample_reference(trajectory: Trajectory, t: float, ahead_t: Array) -> Reference:

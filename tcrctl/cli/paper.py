@@ -1,0 +1,145 @@
+"""``tcrctl paper``: the paper's experiments against its figures."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tcrctl.cli.options import AsJson
+
+if TYPE_CHECKING:
+    from tcrctl.paper.job import Job
+    from tcrctl.paper.paper import Report
+    from tcrctl.paper.processes import Done
+
+    Told = tuple[Callable[[Job], None], Callable[[Done], None]]
+
+Out = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Where the report's folder is made.", show_default=True)
+]
+Only = Annotated[
+    list[str] | None,
+    typer.Option("--only", metavar="ROW", help="Only this row of the table; repeatable. See --rows."),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", metavar="N", min=1, help="Processes side by side.  [default: cores]"),
+]
+Names = Annotated[bool, typer.Option("--rows", help="Print the names of the rows and run nothing.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
+
+_STYLES = {"goal": "green", "met": "green", "missed": "red", "failed": "red", "not run": "yellow"}
+
+
+def paper(
+    out: Out = Path("logs"),
+    only: Only = None,
+    jobs: Workers = None,
+    rows: Names = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    r"""Run every experiment of the paper and compare: paper, bar, goal, measured.
+
+    Runs whose computing time counts have the machine for themselves; the others run side by side. The report
+    goes to a new folder DIR/TIME_paper_ID with paper.md, paper.json and all runs. Exit code 3: a bar was missed.
+    Ctrl-C stops all runs and keeps what is done.
+
+    \b
+    Examples:
+      tcrctl paper
+      tcrctl paper --only letters --only table2
+      tcrctl paper --json --jobs 4 | jq '.rows[] | {name, measured, verdict}'
+    """
+    from tcrctl.paper.paper import choose, jobs_of, run_paper
+    from tcrctl.run_folder import check_writable
+
+    chosen = choose(only or ())
+    if rows:
+        print(json.dumps([row.name for row in chosen]) if as_json else "\n".join(row.name for row in chosen))
+        return
+    check_writable(out)
+    workers = jobs or _cores()
+    with _progress(len(jobs_of(chosen)), quiet=quiet) as (begun, ended):
+        report = run_paper(chosen, out=out, workers=workers, begun=begun, ended=ended)
+    if report.reason:
+        print(f"error: {report.reason}", file=sys.stderr)
+    if as_json:
+        print(json.dumps(report.as_json()))
+    else:
+        _print_table(report)
+    if report.exit_code:
+        raise typer.Exit(report.exit_code)
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def _progress(count: int, *, quiet: bool) -> Iterator[Told]:
+    """Show what is running and what is done: on a terminal with a bar, elsewhere a line for every job."""
+    if quiet:
+        yield (lambda job: None), (lambda done: None)
+        return
+    if not sys.stderr.isatty():
+        yield (lambda job: None), _Counter(count).say
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task, running = bar.add_task("", total=count), dict[str, None]()
+
+        def begun(job: Job) -> None:
+            running[job.label] = None
+            bar.update(task, description=", ".join(label.split()[0] for label in running))
+
+        def ended(done: Done) -> None:
+            running.pop(done.job.label, None)
+            bar.update(task, advance=1, description=", ".join(label.split()[0] for label in running))
+            bar.console.print(_said(done), markup=False, highlight=False)
+
+        yield begun, ended
+
+
+class _Counter:
+    """Says what is done, one line for every job."""
+
+    def __init__(self, count: int) -> None:
+        self._count, self._done = count, 0
+
+    def say(self, done: Done) -> None:
+        self._done += 1
+        print(f"[{self._done}/{self._count}] {_said(done)}", file=sys.stderr, flush=True)
+
+
+def _said(done: Done) -> str:
+    return f"{done.job.label}: {done.reason or 'done'}, {done.seconds:.0f} s"
+
+
+def _print_table(report: Report) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from tcrctl.paper.report import TITLES
+
+    console, table = Console(), Table(box=None)
+    for title in TITLES:
+        table.add_column(title, overflow="fold")
+    for line in report.lines:
+        table.add_row(*(escape(cell) for cell in line.cells()), style=_STYLES.get(line.verdict, ""))
+    console.print(table)
+    for note in report.notes():
+        console.print(note, markup=False, highlight=False)
+    print(f"report: {report.folder}")

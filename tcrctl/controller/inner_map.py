@@ -1,0 +1,58 @@
+"""The iteration inside one control step as a map z^(j) -> z^(j+1), of which (42) asks the eigenvalues."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from tcrctl.robot import linear
+from tcrctl.robot.equations import Load, assemble, make_workspace
+from tcrctl.robot.model import FIXED
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+
+
+class InnerMap(NamedTuple):
+    """One iteration about the point at which it ended.
+
+    Attributes:
+        what: What is iterated, for a report.
+        point: z^(j) at the end (n,).
+        scale: Sizes of changes of its components that are small (n,).
+        apply: z^(j+1) for any z^(j), both (n,).
+    """
+
+    what: str
+    point: Array
+    scale: Array
+    apply: Callable[[Array], Array]
+
+
+def newton_map(what: str, robot: Robot, load: Load, drive: Array, q: Array) -> InnerMap:
+    """One full Newton step of r(q) = 0 with the drives held, about a solution.
+
+    Its derivative at the solution itself is 0, so what is found there is what the tolerance has left.
+
+    Args:
+        what: What is iterated.
+        robot: The robot.
+        load: Integration rule and loads of the equations (*) of ``robot.equations``.
+        drive: Drive lengths (m,) [m].
+        q: Solution (3 n_nodes,) [m].
+    """
+    first, ws = 3 * FIXED, make_workspace(robot.model)
+    nodal, bars, cables = load.nodal.copy(), load.bar_before.copy(), load.cable_before.copy()
+    at = Load(load.inertia, load.w, nodal, bars, cables)
+
+    def apply(z: Array) -> Array:
+        moved, step = q.copy(), np.empty(z.shape)
+        moved[first:] = z
+        assemble(robot.model, moved, drive, at, ws, True)
+        linear.factor_shifted(ws.K, ws.U)
+        linear.solve(ws, ws.r, step)
+        return z - step
+
+    q = q.copy()
+    return InnerMap(what, q[first:].copy(), np.full(q.size - first, 1e-3), apply)

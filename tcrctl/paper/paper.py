@@ -1,0 +1,164 @@
+"""Run the table and write the report."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from tcrctl.errors import RunInterruptedError, UnknownNameError
+from tcrctl.paper.job import Job
+from tcrctl.paper.processes import Done, Processes
+from tcrctl.paper.report import BAD, Line, make_line, markdown
+from tcrctl.paper.row import Row
+from tcrctl.paper.table import ROWS
+from tcrctl.provenance import versions
+from tcrctl.run_folder import RunFolder, make_run_folder
+
+MARKDOWN: Final = "paper.md"
+JSON: Final = "paper.json"
+#: Load per core from which on measured times are not to be trusted.
+BUSY: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The table as far as it got.
+
+    Attributes:
+        folder: Where report and runs lie.
+        lines: One per row.
+        workers: Processes that ran side by side.
+        seconds: Wall time [s].
+        load: Processes that wanted to run on this machine just before, mean of a minute; times suffer if there
+            are nearly as many as cores.
+        interruption: The signal that ended it early, if one did.
+    """
+
+    folder: Path
+    lines: tuple[Line, ...]
+    workers: int
+    seconds: float
+    load: float
+    interruption: RunInterruptedError | None
+
+    @property
+    def missed(self) -> list[str]:
+        """Names of the rows that miss their bar or could not be measured."""
+        return [line.row.name for line in self.lines if line.verdict in BAD]
+
+    @property
+    def exit_code(self) -> int:
+        """Of :mod:`tcrctl.errors`: 3 if a bar is missed."""
+        if self.interruption is not None:
+            return self.interruption.exit_code
+        return 3 if self.missed else 0
+
+    @property
+    def reason(self) -> str:
+        """Why it is not a success; empty if it is one."""
+        if self.interruption is not None:
+            return str(self.interruption)
+        return f"missed: {', '.join(self.missed)}" if self.missed else ""
+
+    def notes(self) -> list[str]:
+        """Sentences that belong below the table."""
+        verdicts = [line.verdict for line in self.lines if line.row.must is not None]
+        met, goals, idle = (
+            sum(v in wanted for v in verdicts) for wanted in (("met", "goal"), ("goal",), ("not run",))
+        )
+        left = f", {idle} not run" if idle else ""
+        notes = [
+            f"{met} of {len(verdicts)} bars met{left}; {goals} goals met too. Made by `tcrctl paper` in "
+            f"{self.seconds:.0f} s with {self.workers} processes."
+        ]
+        if self.load > BUSY * self.cores:
+            busy = f"load {self.load:.1f} on {self.cores} cores"
+            notes.append(f"The machine was busy with other work before ({busy}): times are too long.")
+        return notes
+
+    @property
+    def cores(self) -> int:
+        """Cores of this machine."""
+        return os.cpu_count() or 1
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of ``tcrctl paper --json``."""
+        status = "aborted" if self.interruption else "failed" if self.missed else "success"
+        return {
+            "status": status,
+            "reason": self.reason,
+            "rows": [line.as_json() for line in self.lines],
+            "goals_met": [line.row.name for line in self.lines if line.verdict == "goal"],
+            "seconds": self.seconds,
+            "processes": self.workers,
+            "cores": self.cores,
+            "load_before": self.load,
+            "folder": str(self.folder),
+            "versions": versions(),
+        }
+
+
+def choose(names: Sequence[str]) -> tuple[Row, ...]:
+    """Return the rows of some names, all if there are none.
+
+    Raises:
+        UnknownNameError: If there is no row of a name.
+    """
+    known = [row.name for row in ROWS]
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("row", name, known)
+    return tuple(row for row in ROWS if not names or row.name in names)
+
+
+def jobs_of(rows: Sequence[Row]) -> tuple[Job, ...]:
+    """Return what has to be run for some rows, each job once."""
+    return tuple(dict.fromkeys(job for row in rows for job in row.jobs))
+
+
+def run_paper(
+    rows: Sequence[Row],
+    *,
+    out: Path,
+    workers: int,
+    begun: Callable[[Job], None],
+    ended: Callable[[Done], None],
+) -> Report:
+    """Run the jobs of some rows and write the report; also what there is of it when a signal stops it.
+
+    Args:
+        rows: What to measure.
+        out: Where the report's folder is made.
+        workers: Processes that run side by side.
+        begun: Is told when a job begins; called in any thread.
+        ended: Is told what became of it; called in any thread.
+
+    Raises:
+        DeviceError: If the folder cannot be made or written to.
+    """
+    folder, done, begin = make_run_folder(out, "paper"), dict[Job, Done](), time.monotonic()
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+
+    def keep(item: Done) -> None:
+        done[item.job] = item
+        ended(item)
+
+    interruption = None
+    try:
+        Processes(folder.path, workers).run(jobs_of(rows), begun, keep)
+    except RunInterruptedError as error:
+        interruption = error
+    lines = tuple(make_line(row, done) for row in rows)
+    report = Report(folder.path, lines, workers, time.monotonic() - begin, load, interruption)
+    _write(report, folder)
+    return report
+
+
+def _write(report: Report, folder: RunFolder) -> None:
+    folder.write(MARKDOWN, markdown(report.lines, report.notes()).encode())
+    folder.write(JSON, (json.dumps(report.as_json(), indent=2) + "\n").encode())

@@ -1,0 +1,101 @@
+"""Rows with what was measured, as a table, Markdown and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from tcrctl.paper.job import Job
+from tcrctl.paper.processes import Done
+from tcrctl.paper.row import Row, Verdict
+
+TITLES: Final = ("work", "paper", "must reach", "going to", "measured", "verdict")
+BAD: Final[tuple[Verdict, ...]] = ("missed", "failed")
+_WORDS: Final[Mapping[Verdict, str]] = {
+    "goal": "goal met", "met": "met", "missed": "MISSED", "shown": "-", "failed": "FAILED",
+    "not run": "not run",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A row with what was measured.
+
+    Attributes:
+        row: The row.
+        value: The number; None if there is none.
+        verdict: How it compares.
+        reason: Why there is no number; empty if there is one.
+        measured: The number with all that belongs to it, as text.
+        logs: Logs of its runs.
+    """
+
+    row: Row
+    value: float | None
+    verdict: Verdict
+    reason: str
+    measured: str
+    logs: tuple[str, ...]
+
+    def cells(self) -> tuple[str, ...]:
+        """Texts in the order of ``TITLES``."""
+        row, sign = self.row, ">= " if self.row.at_least else ""
+        work = f"{row.work} [{row.unit}]" if row.unit else row.work
+        bars = ("" if limit is None else f"{sign}{limit:g}" for limit in (row.must, row.goal))
+        word = _WORDS[self.verdict]
+        return (work, row.paper, *bars, self.measured, f"{word}: {self.reason}" if self.reason else word)
+
+    def as_json(self) -> dict[str, Any]:
+        """The item of ``rows`` in ``tcrctl paper --json``."""
+        row = self.row
+        return {
+            "name": row.name,
+            "work": row.work,
+            "unit": row.unit,
+            "paper": row.paper,
+            "must_reach": row.must,
+            "going_to": row.goal,
+            "measured": self.value,
+            "text": self.measured,
+            "verdict": self.verdict,
+            "reason": self.reason,
+            "logs": list(self.logs),
+        }
+
+
+def make_line(row: Row, done: Mapping[Job, Done]) -> Line:
+    """Measure a row by what became of its jobs; some may not have been run."""
+    missing = [job for job in row.jobs if job not in done]
+    failed = [done[job] for job in row.jobs if job in done and done[job].reason]
+    logs = tuple(
+        str(done[job].result["log"]) for job in row.jobs if job in done and "log" in done[job].result
+    )
+    if failed:
+        reason = "; ".join(f"{item.job.label}: {item.reason}" for item in failed)
+        return Line(row, None, "failed", reason, "", logs)
+    if missing:
+        part = f"{len(row.jobs) - len(missing)} of {len(row.jobs)} runs done" if len(row.jobs) > 1 else ""
+        return Line(row, None, "not run", part, "", logs)
+    results = [done[job].result for job in row.jobs]
+    value = row.value(results)
+    verdict = row.verdict(value)
+    if value is None:
+        return Line(row, None, verdict, "the runs do not have the value", "", logs)
+    return Line(row, value, verdict, "", row.text(results) if row.text else f"{value:.3g}", logs)
+
+
+def markdown(lines: Sequence[Line], notes: Sequence[str]) -> str:
+    """Return the table as Markdown.
+
+    Args:
+        lines: The rows.
+        notes: Sentences below the table.
+    """
+    rows = [TITLES, ("---",) * len(TITLES), *(line.cells() for line in lines)]
+    table = "\n".join("| " + " | ".join(_escaped(cell) for cell in row) + " |" for row in rows)
+    return f"{table}\n\n{chr(10).join(notes)}\n"
+
+
+def _escaped(cell: str) -> str:
+    return cell.replace("|", "\\|").replace("\n", " ")

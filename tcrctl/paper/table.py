@@ -1,0 +1,84 @@
+"""The table: every experiment of the paper with its figure, the bar, and the goal. Section and figures: [TCR, V].
+
+Shipped closed-loop experiments run on a plant that differs from the model, springs 30 % softer and density 20 %
+higher, with noisy and late measurements. Runs whose computing time counts have the machine for themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from tcrctl.paper.job import Check, Run
+from tcrctl.paper.row import Result, Row, found, total, worst
+
+LETTERS: Final = ("letter_i", "heart", "letter_d", "letter_u", "letter_t")
+PERFECT: Final = tuple(Run(name, ("plant.mismatch=off",)) for name in LETTERS)
+MISMATCHED: Final = tuple(Run(name) for name in LETTERS)
+FIXED: Final = Run("fixed_point_rotation", alone=True)
+CONE: Final = Run("cone_frustum", alone=True)
+HELIX: Final = Run("helix", alone=True)
+LASER: Final = Run("laser_pipe", alone=True)
+SCAN: Final = Run("box_scan", alone=True)
+FAST_SCAN: Final = Run(
+    "box_scan",
+    ("trajectory.approach_s=14", "trajectory.insert_s=4", "trajectory.tilt_s=6", "trajectory.turn_s=26",
+     "trajectory.return_s=6"),
+)  # fmt: skip
+POLYLINE: Final = Run("box_polyline")
+DYNAMIC: Final = {total_s: Run(f"dynamic_{total_s}s", alone=True) for total_s in (10, 45, 90)}
+TWO_SEGMENTS: Final = (FIXED, CONE, HELIX, *DYNAMIC.values(), LASER, SCAN)
+
+POSITION: Final = worst("position_error_mm.max")
+THETA: Final = worst("theta_x_error_rad.max", "theta_y_error_rad.max")
+X_RMSE: Final = worst("x_error_mm.rms")
+
+
+def inspection(results: Sequence[Result]) -> str:
+    """What was found in the box, and whether it was touched."""
+    (task,) = (result["task"] for result in results)
+    touched = f"collision at {task['collision_s']:.3g} s" if task["collision"] else "no collision"
+    return f"{task['detected']} of {len(task['objects'])}, {touched}"
+
+
+def beams(results: Sequence[Result]) -> str:
+    """How many beams pass."""
+    passed = found(results[0], "task.targets.beam_passes")
+    return f"{sum(passed)} of {len(passed)}"
+
+
+ROWS: Final = (
+    Row("letters_perfect", "letters, position error, perfect model", "2.30 (T)", "mm", 1.0, 0.2,
+        PERFECT, POSITION),
+    Row("letters", "letters, position error", "6.26 .. 10.01 (bench)", "mm", 3.0, 0.5, MISMATCHED, POSITION),
+    Row("fixed_point", "fixed-point rotation, position error", "12.04", "mm", 3.0, 1.0, (FIXED,), POSITION),
+    Row("cone_frustum", "cone frustum, position error", "10.17", "mm", 3.0, 1.0, (CONE,), POSITION),
+    Row("helix", "helix, position error", "8.78", "mm", 3.0, 1.0, (HELIX,), POSITION),
+    Row("fixed_point_theta", "fixed-point rotation, angle error", "0.181", "rad", 0.035, 0.01, (FIXED,), THETA),
+    Row("cone_frustum_theta", "cone frustum, angle error", "0.141", "rad", 0.035, 0.01, (CONE,), THETA),
+    Row("helix_theta", "helix, angle error", "0.087", "rad", 0.035, 0.01, (HELIX,), THETA),
+    Row("dynamic_10s", "turn in 10 s, RMSE in x", "2.56", "mm", 1.0, 0.3, (DYNAMIC[10],), X_RMSE),
+    Row("dynamic_45s", "turn in 45 s, RMSE in x", "0.16", "mm", 0.16, 0.05, (DYNAMIC[45],), X_RMSE),
+    Row("dynamic_90s", "turn in 90 s, RMSE in x", "0.07", "mm", 0.07, 0.03, (DYNAMIC[90],), X_RMSE),
+    Row("laser_pipe", "laser, position error at the targets", "8.7, 13.9", "mm", 2.0, 0.5, (LASER,),
+        worst("task.targets.position_error_mm")),
+    Row("laser_beam", "laser, beams through their pipes", "2 of 2", "", 2, 2, (LASER,),
+        total("task.targets.beam_passes"), at_least=True, text=beams),
+    Row("box_scan", "box scan, objects found before any collision", "3 of 3", "", 3, 3, (SCAN,),
+        total("task.detected"), at_least=True, text=inspection),
+    Row("box_scan_time", "box scan, time until all are found", "84", "s", 84.0, 60.0, (SCAN,),
+        worst("task.detection_s")),
+    Row("box_scan_60s", "box scan of 60 s, objects found", "-", "", None, 3, (FAST_SCAN,),
+        total("task.detected"), at_least=True, text=inspection),
+    Row("box_polyline", "box polyline, objects found", "1 of 3, collision", "", None, None, (POLYLINE,),
+        total("task.detected"), at_least=True, text=inspection),
+    Row("table2", "Table II, mean endpoint error of the model", "7.77", "mm", 7.0, 5.0, (Check("table2"),),
+        worst("mean_error_mm")),
+    Row("control_p50", "control step, two segments, median", "< 10 (MATLAB)", "ms", 1.5, 0.3, TWO_SEGMENTS,
+        worst("control_ms.p50")),
+    Row("control_p99", "control step, two segments, 99 %", "< 10 (MATLAB)", "ms", 5.0, 1.0, TWO_SEGMENTS,
+        worst("control_ms.p99")),
+    Row("plant_step", "plant step of 1 ms, 13 modules, median", "1.7 (Exudyn)", "ms", 0.5, 0.1,
+        (Check("plant_step", alone=True),), worst("step_ms.p50")),
+)  # fmt: skip
+"""Every row, in the order of the paper."""

@@ -1,0 +1,248 @@
+"""The comparison with the paper: rows as data, jobs as processes, verdicts, and what is kept when it is stopped."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tcrctl.cli.app import main
+from tcrctl.errors import RunInterruptedError, UnknownNameError
+from tcrctl.paper import paper
+from tcrctl.paper.checks import CHECKS
+from tcrctl.paper.job import Check, Run
+from tcrctl.paper.paper import choose, jobs_of, run_paper
+from tcrctl.paper.processes import Done, Processes
+from tcrctl.paper.report import TITLES, make_line, markdown
+from tcrctl.paper.row import Row, found, total, worst
+from tcrctl.paper.table import ROWS
+from tcrctl.paper.table2 import CONFIGURATIONS, measured_displacements, model_displacements
+from tcrctl.spec import load_spec
+
+
+@dataclass(frozen=True)
+class Script:
+    """A job that runs a little program."""
+
+    label: str
+    program: str
+    alone: bool = False
+
+    def command(self, folder: Path) -> list[str]:
+        return [sys.executable, "-c", self.program, str(folder)]
+
+
+def nothing(item):
+    del item
+
+
+def collected(jobs, folder, workers=2):
+    done = {}
+    Processes(folder, workers).run(jobs, nothing, lambda item: done.update({item.job: item}))
+    return done
+
+
+def row(job, must=1.0, goal=0.1, **changes):
+    return Row("r", "work", "2.3", "mm", must, goal, (job,), worst("x"), **changes)
+
+
+def test_every_row_has_its_own_name_and_jobs_that_exist():
+    names = [row.name for row in ROWS]
+    assert len(set(names)) == len(names)
+    for job in jobs_of(ROWS):
+        if isinstance(job, Run):
+            assert load_spec(job.experiment, job.overrides).spec.criteria
+        else:
+            assert isinstance(job, Check)
+            assert job.name in CHECKS
+
+
+def test_runs_whose_time_counts_have_the_machine_for_themselves():
+    timed = [row for row in ROWS if row.unit == "ms"]
+    assert len(timed) == 3
+    assert all(job.alone for row in timed for job in row.jobs)
+
+
+def test_a_job_that_several_rows_need_runs_once():
+    assert len(jobs_of(choose(["fixed_point", "fixed_point_theta"]))) == 1
+
+
+def test_an_unknown_row_is_refused_with_those_there_are():
+    with pytest.raises(UnknownNameError, match="laser_pipe") as caught:
+        choose(["laser_pip"])
+    assert "laser_pipe" in caught.value.hint
+
+
+@given(st.floats(0, 10), st.floats(0, 10), st.floats(0, 10), st.booleans())
+def test_a_better_value_never_gets_a_worse_verdict(value, other, span, at_least):
+    must, goal = (5.0, 5.0 + span) if at_least else (5.0, 5.0 - span)
+    judged = row(Script("a", ""), must, goal, at_least=at_least)
+    ranks = {"missed": 0, "met": 1, "goal": 2}
+    better, worse = (max, min) if at_least else (min, max)
+    good, bad = better(value, other), worse(value, other)
+    assert ranks[judged.verdict(good)] >= ranks[judged.verdict(bad)]
+    assert (judged.verdict(value) == "missed") == (value < must if at_least else value > must)
+
+
+def test_without_a_bar_nothing_is_missed_and_without_a_value_it_is_a_failure():
+    assert row(Script("a", ""), None, None).verdict(99.0) == "shown"
+    assert row(Script("a", ""), None, 1.0).verdict(99.0) == "shown"
+    assert row(Script("a", ""), None, 1.0).verdict(0.5) == "goal"
+    assert row(Script("a", "")).verdict(None) == "failed"
+
+
+def test_values_are_found_through_maps_and_lists():
+    result = {"task": {"targets": [{"e": 1.0, "ok": True}, {"e": 3.0, "ok": False}]}, "p": {"max": 2.0}}
+    assert found(result, "task.targets.e") == [1.0, 3.0]
+    assert worst("task.targets.e", "p.max")([result, {"task": {"targets": []}, "p": {"max": 4.0}}]) == 4.0
+    assert total("task.targets.ok")([result]) == 1.0
+    assert worst("p.min")([result]) is None
+    assert worst("p.max")([result, {"p": None}]) is None
+
+
+#: Leaves a mark while it runs; waits for another one if it is to run beside it, else looks whether there is none.
+MARKED = """
+import json, sys, time
+from pathlib import Path
+folder, name, partner = Path(sys.argv[1]), {name!r}, {partner!r}
+(folder / name).touch()
+begin = time.monotonic()
+while partner and not (folder / partner).exists() and time.monotonic() - begin < 30.0:
+    time.sleep(0.01)
+time.sleep(0.2)
+print(json.dumps({{"x": sorted(path.name for path in folder.iterdir())}}))
+if not partner:
+    (folder / name).unlink()
+"""
+
+
+def test_jobs_run_side_by_side_but_those_alone_do_not(tmp_path):
+    partners = {"a": "", "b": "", "c": "d", "d": "c"}
+    jobs = [Script(n, MARKED.format(name=n, partner=p), alone=not p) for n, p in partners.items()]
+    seen = {job.label: item.result["x"] for job, item in collected(jobs, tmp_path).items()}
+    assert seen == {"a": ["a"], "b": ["b"], "c": ["c", "d"], "d": ["c", "d"]}
+
+
+@pytest.mark.parametrize(
+    ("program", "reason"),
+    [
+        ('print(\'{"reason": "diverged"}\'); raise SystemExit(4)', "diverged"),
+        ("import sys; print('no such robot', file=sys.stderr); sys.exit(2)", "exit code 2: no such robot"),
+        ("raise SystemExit(0)", "exit code 0: it said nothing"),
+        ("print('not json')", "it said nothing"),
+        ("import os; os.kill(os.getpid(), 9)", "ended by SIGKILL"),
+    ],
+)
+def test_a_failed_job_is_a_row_with_its_reason(program, reason, tmp_path):
+    job = Script("a", program)
+    line = make_line(row(job), collected([job], tmp_path))
+    assert (line.verdict, line.value) == ("failed", None)
+    assert line.reason.startswith("a: ")
+    assert reason in line.reason
+
+
+def test_a_run_that_misses_its_own_criterion_is_still_measured(tmp_path):
+    job = Script("a", 'print(\'{"x": 0.5, "log": "l.mcap"}\'); raise SystemExit(3)')
+    line = make_line(row(job), collected([job], tmp_path))
+    assert (line.verdict, line.value, line.logs) == ("met", 0.5, ("l.mcap",))
+
+
+def test_the_markdown_table_has_a_cell_for_every_title():
+    job = Script("a", "")
+    lines = [
+        make_line(row(job), {job: Done(job, {"x": 0.5}, "", 1.0)}),
+        make_line(row(job), {job: Done(job, {}, "a | b\nc", 1.0)}),
+        make_line(row(job), {}),
+    ]
+    table = markdown(lines, ["Note."]).splitlines()
+    assert [line.replace("\\|", "").count("|") for line in table[:5]] == [len(TITLES) + 1] * 5
+    assert "| work [mm] | 2.3 | 1 | 0.1 | 0.5 | met |" in table
+    assert lines[2].verdict == "not run"
+
+
+def test_ctrl_c_stops_the_jobs_and_keeps_what_is_done(tmp_path):
+    quick = Script("quick", "print('{\"x\": 0.05}')", alone=True)
+    slow = Script(
+        "slow",
+        "import sys, time\ntry:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n"
+        "    open(sys.argv[1] + '/safe', 'w').close(); raise SystemExit(130)",
+    )
+    begun = threading.Event()
+
+    def press():
+        begun.wait(20.0)
+        time.sleep(0.5)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=press).start()
+    report = run_paper(
+        [row(quick), row(slow)],
+        out=tmp_path,
+        workers=2,
+        begun=lambda job: begun.set() if job == slow else None,
+        ended=nothing,
+    )
+    assert (report.exit_code, report.as_json()["status"]) == (130, "aborted")
+    assert isinstance(report.interruption, RunInterruptedError)
+    assert [line.verdict for line in report.lines] == ["goal", "not run"]
+    assert (report.folder / "safe").exists()  # it was asked to stop, and could
+    assert json.loads((report.folder / "paper.json").read_text())["rows"][0]["measured"] == 0.05
+
+
+def test_the_command_prints_one_object_and_exits_with_3_if_a_bar_is_missed(tmp_path, capsys, monkeypatch):
+    jobs = [
+        Script("good", "print('{\"x\": 0.5}')"),
+        Script("bad", "print('{\"x\": 1.5}')"),
+        Script("ugly", "raise SystemExit(1)"),
+    ]
+    rows = tuple(
+        Row(job.label, "work", "2.3", "mm", 1.0, 0.1, (job,), worst("x"), False, None) for job in jobs
+    )
+    monkeypatch.setattr(paper, "ROWS", rows)
+    assert main(["paper", "--json", "--out", str(tmp_path)]) == 3
+    printed = capsys.readouterr()
+    made = json.loads(printed.out)
+    assert {item["name"]: item["verdict"] for item in made["rows"]} == {
+        "good": "met",
+        "bad": "missed",
+        "ugly": "failed",
+    }
+    assert made["reason"] == "missed: bad, ugly"
+    assert printed.err.count("[") == 3
+    assert main(["paper", "--only", "good", "--quiet", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr()
+    assert "1 of 1 bars met" in printed.out
+    assert printed.err == ""
+    folders = list(tmp_path.iterdir())
+    assert len(folders) == 2
+    assert all({"paper.md", "paper.json"} <= {p.name for p in folder.iterdir()} for folder in folders)
+
+
+def test_the_displacements_of_table_2_keep_their_lengths_in_the_robots_frame(tcr700):
+    measured = measured_displacements()
+    lengths = [133.1, 91.0, 229.0]  # the table's relative errors are parts of these, [TCR, Table II]
+    relative = [7.57 / 0.0568, 5.99 / 0.0658, 9.75 / 0.0426]
+    assert [1e3 * np.linalg.norm(measured[name]) for name in CONFIGURATIONS] == pytest.approx(
+        lengths, abs=0.5
+    )
+    assert relative == pytest.approx(lengths, rel=0.005)
+    model = model_displacements(tcr700)
+    assert np.linalg.norm(model["contraction"][:2]) < 2e-3  # symmetric drives bend nothing
+    assert all(model[name][2] > 0.0 for name in CONFIGURATIONS)  # pulling shortens
+
+
+def test_a_real_row_from_the_command_to_the_number(tmp_path, capsys):
+    assert main(["paper", "--only", "table2", "--json", "--quiet", "--out", str(tmp_path)]) == 0
+    (line,) = json.loads(capsys.readouterr().out)["rows"]
+    assert line["verdict"] == "met"
+    assert line["measured"] == pytest.approx(6.80, abs=0.02)
