@@ -146,7 +146,10 @@ class Summary:
     task: dict[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """The object of ``run --json``; numbers that are not finite become null."""
+        """The object of ``run --json``; numbers that are not finite become null; a latency is there on a rig."""
+        measures = dataclasses.asdict(self.measures)
+        if self.measures.latency_ms is None:
+            del measures["latency_ms"]
         head = {
             name: getattr(self, name) for name in ("run_id", "spec", "robot", "plant", "controller", "status")
         }
@@ -155,9 +158,7 @@ class Summary:
             "log": str(self.log),
             "task": self.task,
         }
-        made: dict[str, Any] = _finite(
-            {**head, "reason": self.reason, **dataclasses.asdict(self.measures), **tail}
-        )
+        made: dict[str, Any] = _finite({**head, "reason": self.reason, **measures, **tail})
         return made
 
 
