@@ -47,7 +47,7 @@ class Case:
 
     Attributes:
         name: For the table.
-        cameras: Attributes of ``MotiveFaults``, or the name of a method of the emulator.
+        cameras: Attributes of ``MotiveFaults``; or the name of a method of the emulator, and its arguments.
         plc: Name of a PLC fault, and its arguments.
         connect, armed, moving, stopping: State in which the supervisor ends, by the phase in which the fault
             begins; empty where the phase is not tried.
@@ -89,7 +89,8 @@ def plc_lost(name, fault, says, **arguments):
     )  # fmt: skip
 
 
-MARKERS = frozenset(f"m{ring}.n{node}" for ring in range(1, 6) for node in (1, 2, 3))
+NAMES = [f"m{ring}.n{node}" for ring in range(1, 6) for node in (1, 2, 3)]
+MARKERS = frozenset(NAMES)
 FEW = frozenset(("m1.n1", "m3.n2", "m5.n3"))
 
 CASES = [
@@ -111,7 +112,11 @@ CASES = [
     blinding("all markers not listed", missing=MARKERS),
     blinding("all markers are NaN", nan=MARKERS),
     blinding("no marker has a label", unlabelled=True),
-    Case("Motive restarts", "restart", moving="disarmed", says="usable measurement", rule="stale"),
+    harmless("models announced anew", cameras=("change_models", NAMES)),
+    harmless("stream changes to NatNet 3.1", cameras=("change_version", "3.1")),
+    Case("markers renamed", ("change_models", [f"{name}?" for name in NAMES]), moving="disarmed",
+         says="usable measurement", rule="stale"),
+    Case("Motive restarts", ("restart",), moving="disarmed", says="usable measurement", rule="stale"),
     Case("origin jumps by 100 mm", {"offset_m": (0.1, 0.0, 0.0)}, moving="disarmed",
          says="usable measurement", rule="stale"),
     Case("frames 0.5 s late", {"delay_s": 0.5}, moving="disarmed", says="usable measurement", rule="stale"),
@@ -177,9 +182,8 @@ class Bench:
 
     def __post_init__(self):
         random, rest = np.random.default_rng(0), self.robot.rest.q.reshape(-1, 3)[ring_rows(5)]
-        names = [f"m{ring}.n{node}" for ring in range(1, 6) for node in (1, 2, 3)]
         self.motive = MotiveEmulator(
-            names,
+            NAMES,
             lambda: rest + 5e-5 * random.standard_normal(rest.shape),
             MotiveSettings(command_port=0, rate_hz=200.0),
         )
@@ -224,10 +228,12 @@ class Bench:
         return build_rig(self.loaded(), self.robot, PERIOD, session)
 
     def fail(self, case: Case):
-        if isinstance(case.cameras, str):
-            getattr(self.motive, case.cameras)()
-        for name, value in (case.cameras or {}).items() if not isinstance(case.cameras, str) else ():
-            setattr(self.motive.faults, name, value)
+        if isinstance(case.cameras, tuple):
+            method, *given = case.cameras
+            getattr(self.motive, method)(*given)
+        elif case.cameras is not None:
+            for name, value in case.cameras.items():
+                setattr(self.motive.faults, name, value)
         if case.plc is not None:
             self.plc.faults.set(case.plc[0], **case.plc[1])
 

@@ -28,6 +28,7 @@ WRONG = {
     "not a switch": ("{at_s: 1, cameras: {freeze: 1}}", "must be true or false"),
     "not names": ("{at_s: 1, cameras: {nan: 3}}", "must be a list of marker names"),
     "not pairs": ("{at_s: 1, cameras: {swap: [a, b]}}", "must be a list of pairs"),
+    "not a version": ("{at_s: 1, cameras: {version: 4.1}}", "must be a version such as '3.1'"),
     "before the start": ("{at_s: -1, plc: estop}", "must be >= 0"),
     "unknown event": ("{at_s: 1, after: lunch, plc: estop}", "after"),
 }
@@ -93,10 +94,20 @@ def test_every_fault_of_the_emulators_can_be_asked_for(tmp_path):
     names = "[a.1]"
     values = {
         **{"occluded": names, "missing": names, "nan": names, "swap": "[[a.1, a.2]]"},
-        **{"offset_m": "[0, 0, 1]", "reorder": "2"},
+        **{"offset_m": "[0, 0, 1]", "reorder": "2", "version": "'3.1'", "renamed": "true"},
     }
     switches = ("freeze", "silent", "mute", "untracked", "unlabelled")
     given = {name: values.get(name, "true" if name in switches else "0.5") for name in CAMERA_FAULTS}
     lines = [f"{{at_s: 0, cameras: {{{name}: {value}}}}}" for name, value in given.items()]
     lines += [f"{{at_s: 0, plc: {name}}}" for name in FAULTS]
     assert len(script(tmp_path, *lines).faults) == len(CAMERA_FAULTS) + len(FAULTS)
+
+
+def test_cameras_change_names_and_version_and_change_them_back(tmp_path, bench):
+    motive, plc = bench
+    made = script(tmp_path, "{at_s: 1, cameras: {renamed: true, version: '3.1'}, for_s: 1}")
+    player = Player(made, motive, {"tcr600": plc}, lambda text: None)
+    player.play(1.0)
+    assert (motive.scene.names, motive.version) == (("a.1?", "a.2?"), (3, 1))
+    player.play(2.0)
+    assert (motive.scene.names, motive.version) == (("a.1", "a.2"), (4, 1))

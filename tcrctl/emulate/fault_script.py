@@ -4,11 +4,16 @@ faults:
   - {at_s: 2, after: moving, cameras: {loss: 0.1}, for_s: 5}
   - {at_s: 8, after: moving, plc: estop, for_s: 1}
   - {at_s: 12, plc: exception, with: {code: 4}, robot: tcr700}
+  - {at_s: 15, cameras: {version: '3.1'}}
+
+Cameras can also ``restart`` (once), stream another ``version``, and be ``renamed``: all markers get names that
+nobody knows.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -25,7 +30,8 @@ from tcrctl.settings import Path as Keys
 from tcrctl.settings import Settings, quantity, refuse
 
 _DEFAULTS = MotiveFaults()
-CAMERA_FAULTS = tuple(field.name for field in dataclasses.fields(MotiveFaults))
+_CHANGES = {"version": "", "renamed": False}
+CAMERA_FAULTS = (*(field.name for field in dataclasses.fields(MotiveFaults)), *_CHANGES)
 #: A drive that moves faster than this between two looks is moving [um].
 MOVING_UM = 30.0
 
@@ -87,7 +93,9 @@ def camera_value(name: str, value: Any) -> Any:
     Raises:
         ValueError: If it is not of that kind.
     """
-    kind = type(getattr(_DEFAULTS, name))
+    if name == "version" and isinstance(value, str) and re.fullmatch(r"[0-9]+\.[0-9]+", value):
+        return value
+    kind = type(_CHANGES[name] if name in _CHANGES else getattr(_DEFAULTS, name))
     if kind is frozenset and isinstance(value, list) and all(isinstance(item, str) for item in value):
         return frozenset(value)
     if name == "swap" and isinstance(value, list) and all(isinstance(v, list) and len(v) == 2 for v in value):
@@ -101,12 +109,17 @@ def camera_value(name: str, value: Any) -> Any:
     ):
         return kind(value)
     names = {
+        str: "text",
         frozenset: "a list of marker names",
         bool: "true or false",
         int: "a whole number",
         float: "a number",
     }
-    special = {"swap": "a list of pairs of marker names", "offset_m": "three numbers"}
+    special = {
+        "version": "a version such as '3.1'",
+        "swap": "a list of pairs of marker names",
+        "offset_m": "three numbers",
+    }
     raise ValueError(f"must be {special.get(name) or names[kind]}, not {value!r}")
 
 
@@ -138,6 +151,7 @@ class Player:
     ) -> None:
         """Take a script; ``notify`` takes what happens, for people."""
         self._motive, self._plcs, self._notify = motive, plcs, notify
+        self._names = motive.scene.names
         self._waiting = list(script.faults)
         self._active: list[tuple[float, Fault]] = []
         self._since: dict[str, float] = {"start": 0.0}
@@ -172,7 +186,7 @@ class Player:
             self._motive.restart()
         elif isinstance(fault.cameras, dict):
             for name, value in fault.cameras.items():
-                setattr(self._motive.faults, name, camera_value(name, value))
+                self._change_cameras(name, camera_value(name, value))
         else:
             for plc in self._chosen(fault):
                 plc.faults.set(str(fault.plc), **fault.with_)
@@ -183,10 +197,19 @@ class Player:
         self._notify(f"over: {fault}")
         if isinstance(fault.cameras, dict):
             for name in fault.cameras:
-                setattr(self._motive.faults, name, getattr(_DEFAULTS, name))
+                self._change_cameras(name, getattr(_DEFAULTS, name, None))
         elif fault.plc is not None:
             for plc in self._chosen(fault):
                 plc.faults.clear(fault.plc)
+
+    def _change_cameras(self, name: str, value: Any) -> None:
+        """Set a fault of the cameras, or take it back with its default."""
+        if name == "version":
+            self._motive.change_version(value or self._motive.settings.version)
+        elif name == "renamed":
+            self._motive.change_models([f"{known}?" if value else known for known in self._names])
+        else:
+            setattr(self._motive.faults, name, value)
 
     def _chosen(self, fault: Fault) -> list[PlcEmulator]:
         return [plc for name, plc in self._plcs.items() if fault.robot in (None, name)]
