@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -219,15 +219,19 @@ class RigPlant:
                 return self._sight()
 
     def _come_to_rest(self) -> None:
-        """Let the PLC ramp down, and see the drives stand still from one cycle to the next."""
+        """Let the PLC ramp down, and see the drives stand still from one cycle to the next.
+
+        A PLC that takes no more commands may still tell that it has stopped.
+        """
         self.supervisor.stop(self._clock(), "end of the run")
         before: Micrometres | None = None
         while self.supervisor.state is State.STOPPING:
             self._line.exchange(self.position(), self.supervisor.control)
-            now = self.position()
+            answered, now = self._line.ask(), self.position()
             moved = before is None or bool(np.any(np.abs(now - before) > STILL))
             before = now
-            if self.supervisor.rest(self._clock(), self._sight(), moved=moved) is State.STOPPING:
+            sight = replace(self._sight(), silence=0.0) if answered else self._sight()
+            if self.supervisor.rest(self._clock(), sight, moved=moved) is State.STOPPING:
                 self._sleep(CYCLE)
 
     # --- devices ---
