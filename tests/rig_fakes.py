@@ -43,6 +43,7 @@ class FakeCameras:
     rate: float = 250.0
     seen: int = N
     silent: bool = False
+    doubts: str = ""
     closed: int = 0
     last: float = -1.0
     error: DeviceError | None = None
@@ -55,7 +56,7 @@ class FakeCameras:
             return None
         self.clock.time += 1.0 / self.rate
         valid = np.arange(N) < self.seen
-        return Sighting(self.clock.time - 0.003, np.ones((N, 3), np.float32), valid, "", NO_FRAME)
+        return Sighting(self.clock.time - 0.003, np.ones((N, 3), np.float32), valid, self.doubts, NO_FRAME)
 
     def close(self):
         self.closed += 1

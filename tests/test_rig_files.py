@@ -45,6 +45,10 @@ MISTAKES = {
     "unknown antagonist": ("[c1, c2, c3]", "[c1, c2, c7]", "there is no cable c7; known: c1, c2, c3"),
     "no such brace": ("tcr600_m{ring}.n{node}", "tcr600_m{row}.n{node}", "may contain {ring} and {node}"),
     "no rotation": ("[0.6532814824, ", "[0.9, ", "must have length 1"),
+    "half an identity": ("n{node}', base", "n{node}', nodes: [{node: m1.n1, asset: 3}], base", "belong together"),
+    "two identities": (
+        "n{node}', base", "n{node}', nodes: [{node: m1.n1, label: a.b, asset: 3, member: 1}], base", "not both"
+    ),
     "unknown key": ("up_axis: y", "up: y", "unknown key"),
     "wrong kind": ("kind: natnet", "kind: vicon", "must be 'natnet'"),
     "times the wrong way round": ("stale_stop_ms: 400", "stale_stop_ms: 40", "greater than stale_after_ms, 100"),

@@ -233,6 +233,19 @@ def test_clamps_are_reported_once_with_both_values_and_their_end():
     assert bench.targets().max() == 1200
 
 
+def test_doubted_markers_are_reported_when_the_reasons_change_not_in_every_frame():
+    bench = started()
+    for doubts in ("", "2 jump", "3 jump", "1 jump, 1 occluded", "1 jump"):
+        bench.cameras.doubts = doubts
+        bench.run(command(0.0), 30)
+    bench.cameras.doubts = ""
+    bench.run(command(0.0), 30)
+    found = [(level, text) for kind, level, text in bench.events if kind == "markers"]
+    assert [level for level, _ in found] == ["warning", "warning", "warning", "info"]
+    assert found[0][1] == "markers that cannot be used: 2 jump"
+    assert "1 jump, 1 occluded" in found[1][1]
+
+
 def test_whatever_goes_wrong_the_devices_are_closed():
     bench = started()
     bench.run(command(), 2)

@@ -109,7 +109,7 @@ class NatNetCameras:
         self._settings, self._last, self._bits = cameras, None, b""
         try:
             with device_errors(f"cameras at {cameras.server}"):
-                self.rate = self.client.frame_rate()
+                self.rate = cameras.rate_hz or self.client.frame_rate()
                 self._map, self._rows = _marker_map(cameras, markers, calibration, robot)
                 self._check_labels()
             self._n_nodes = 3 * robot.n_modules

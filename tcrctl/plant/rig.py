@@ -20,6 +20,7 @@ import numpy as np
 
 from tcrctl.errors import ArmingRefusedError, DeviceError
 from tcrctl.plant.devices import Cameras, DriveControl, Drives, Sighting
+from tcrctl.plant.doubt_notes import DoubtNotes
 from tcrctl.plant.drive_line import DriveLine
 from tcrctl.plant.session import Session
 from tcrctl.plant.set_points import ClampNotes, DriveEnvelope, Micrometres, SetPoints
@@ -90,7 +91,7 @@ class RigPlant:
         self._refused = 0
         self._seen: Sighting | None = None
         self._usable_at = -np.inf
-        self._clamps = ClampNotes(session.report)
+        self._clamps, self._doubts = ClampNotes(session.report), DoubtNotes(session.report, clock)
 
     # --- the loop ---
 
@@ -253,12 +254,12 @@ class RigPlant:
 
     def _measurement(self, sighting: Sighting | None) -> Measurement:
         now, run_time = self._clock(), self._session.time()
-        drive = (
-            np.zeros(0) if self._line.status is None else np.asarray(1e-6 * self._line.status.position, float)
-        )
+        status = self._line.status
+        drive = np.zeros(0) if status is None else np.asarray(1e-6 * status.position, float)
         if sighting is None:
             return self._last_seen(run_time - now, drive)
         self._seen = sighting
+        self._doubts.note(sighting.doubts)
         if np.count_nonzero(sighting.valid) >= self._limits.min_seen * self._limits.mapped:
             self._usable_at = sighting.taken
         taken = run_time - (now - sighting.taken)

@@ -31,6 +31,7 @@ class CameraSettings(Settings):
         default=None, pattern=r"^[0-9]+\.[0-9]+$", description="NatNet version to ask for (unicast only)"
     )
     allow_newer: bool = Field(default=False, description="decode versions newer than those that were tested")
+    rate_hz: float | None = quantity("Hz", "frames per second; null: the server is asked", None, gt=0)
     up_axis: Literal["y", "z"] = Field(default="y", description="as set in Motive; only for rig calibrate")
     jump_gate_mm: float = quantity(
         "mm", "a marker that has jumped further is not used; less than half the marker distance", 24.0, gt=0
@@ -46,6 +47,14 @@ class MarkerEntry(Settings):
     label: str | None = Field(default=None, description="asset.marker as in Motive")
     asset: int | None = Field(default=None, ge=0, description="streaming id of the asset")
     member: int | None = Field(default=None, ge=0, description="number of the marker in it")
+
+    @model_validator(mode="after")
+    def _one_identity(self) -> MarkerEntry:
+        if (self.asset is None) != (self.member is None):
+            refuse([((), "asset and member belong together")])
+        if self.label is not None and self.asset is not None:
+            refuse([((), "give a label, or asset and member, not both")])
+        return self
 
 
 class MarkerSettings(Settings):
