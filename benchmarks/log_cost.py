@@ -2,8 +2,9 @@
 
     python benchmarks/log_cost.py [--seconds 5]
 
-Steps are those of a 13-module, six-cable robot with full entropy in every digit. ``full`` includes the
-simulated truth, ``rig`` does not; the bytes of the viewer topics are the difference to a log without them.
+Steps are those of a 13-module, six-cable robot with full entropy in every digit, each with its state at 20 Hz and
+with the state once a second at 1 kHz, as by default. ``full`` includes the simulated truth, ``rig`` does not; the
+bytes of the viewer topics are the difference to a log without them.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import records
 from tcrctl.log.viewer_topics import ViewerTopics
 from tcrctl.log.writer import LogWriter
 from tcrctl.signals import StepRecord
+from tcrctl.spec import LogSettings
 
 N_MODULES, N_CABLES, N_RECORDS = 13, 6, 400
 
@@ -47,6 +49,7 @@ def log_run(rate_hz: float, seconds: float, truth: bool, paced: bool) -> tuple[l
             epoch_ns=time.time_ns(),
             period_s=period,
             flush_steps=500 if paced else max(1, int(0.5 * rate_hz)),
+            full_state_s=LogSettings().full_state(period),
             wait_when_full=not paced,
         ) as log:
             empty = path.stat().st_size

@@ -1,10 +1,11 @@
-"""A log as a table (CSV) or as arrays (npz), for tools that do not read MCAP.
+"""A log as a table (CSV, Parquet) or as arrays (npz), for tools that do not read MCAP.
 
 Names are the column names of :mod:`tcrctl.log.columns` with the component, where there is one, and the SI
 unit at the end: ``t_s``, ``estimate_position_x_m``, ``applied_speed_c1_m_s``, ``truth_tension_c3_n``,
 ``measurement_nodes_m7_n1_z_m``. An npz file keeps arrays whole: ``estimate_position_m`` is (n_steps, 3),
 ``measurement_nodes_m`` (n_steps, n_markers, 3); it also has ``node_names``, ``cable_names`` and
-``marker_names``. Numbers in CSV are the shortest that read back as the same bits; bools are 0 and 1.
+``marker_names``. Numbers in CSV are the shortest that read back as the same bits; bools are 0 and 1. Parquet has
+the columns of CSV in their own types. Where a lean step has no full state, numbers are NaN.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Iterable
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -47,15 +49,41 @@ def export_csv(
         InputError: If ``path`` is not a log, or ``out`` exists and ``force`` is False.
         LogError: If the log is damaged or ``out`` cannot be written.
     """
-    log = read_log(path)
-    wanted = [name for name, column in COLUMNS.items() if nodes or not _per_node(column)]
-    table: dict[str, NDArray[Any]] = {}
-    for name, values in log.columns(wanted).items():
-        table |= _flat(name, values, log)
+    table = _table(read_log(path), nodes)
     with _create(Path(out), force) as stream:
         writer = csv.writer(stream)
         writer.writerow(table)
         writer.writerows(zip(*(_cells(values) for values in table.values()), strict=True))
+    return list(table)
+
+
+def export_parquet(
+    path: str | os.PathLike[str], out: str | os.PathLike[str], *, nodes: bool = False, force: bool = False
+) -> list[str]:
+    """Write one row per step and one column per number, as Apache Parquet.
+
+    Args:
+        path: The log, finished or not.
+        out: Parquet file to create.
+        nodes: As in :func:`export_csv`.
+        force: Replace ``out`` if it exists.
+
+    Returns:
+        The column names, in order.
+
+    Raises:
+        InputError: If ``path`` is not a log, ``out`` exists and ``force`` is False, or pyarrow is not installed.
+        LogError: If the log is damaged or ``out`` cannot be written.
+    """
+    try:
+        pyarrow: Any = import_module("pyarrow")
+        parquet: Any = import_module("pyarrow.parquet")
+    except ImportError as error:
+        hint = "pip install 'tcrctl[parquet]'"
+        raise InputError("Parquet needs the package pyarrow, which is not installed", hint=hint) from error
+    table = _table(read_log(path), nodes)
+    with _create(Path(out), force, binary=True) as stream:
+        parquet.write_table(pyarrow.table(table), stream)
     return list(table)
 
 
@@ -85,6 +113,15 @@ def export_npz(
     with _create(Path(out), force, binary=True) as stream:
         np.savez_compressed(stream, **arrays)
     return list(arrays)
+
+
+def _table(log: Log, nodes: bool) -> dict[str, NDArray[Any]]:
+    """Every number of every step, each (n_steps,), by full name."""
+    wanted = [name for name, column in COLUMNS.items() if nodes or not _per_node(column)]
+    table: dict[str, NDArray[Any]] = {}
+    for name, values in log.columns(wanted).items():
+        table |= _flat(name, values, log)
+    return table
 
 
 def _per_node(column: Column) -> bool:

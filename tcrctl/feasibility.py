@@ -207,9 +207,9 @@ def _newton_step(robot: Robot, target: Array, held: Held, limits: DriveLimits) -
 
     Also returns by how much the second part changes a tension at most [N].
     """
-    rows, first = target.size, 3 * (robot.tip - FIXED)
+    rows = target.size
     scale = REACHED[:rows]
-    response = pose.output_matrix(held.shape.q, robot.tip) @ held.shape.gain[first : first + 9]
+    response = pose.drive_gain(held.shape.q, held.shape.gain, robot.tip)
     tip, turn = response[:rows], TURN_WEIGHT * response[3:6]
     left = target - _pose(robot, held.shape)[:rows]
     U, s, Vt = np.linalg.svd(tip / scale[:, None])

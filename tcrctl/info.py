@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.log.reader import Log, read_log
+from tcrctl.log.reader import read_log
 
 _BUSY = ("timing_read", "timing_estimate", "timing_control", "timing_write")
 _COLUMNS = ("k", "t", "period", *_BUSY, "timing_lateness", "info_converged")
@@ -50,7 +50,8 @@ class LogInfo:
         unconverged_steps: Steps whose inner problem was not solved.
         events: Number of events by level.
         attachments: Names of the attached files.
-        start: Metadata of the start: who, when, what ran, versions.
+        start: Metadata of the start: who, when, what ran.
+        versions: Versions of packages, Python, processor.
         summary: Result of the run as in ``run --json``; empty if it was not recorded.
     """
 
@@ -74,6 +75,7 @@ class LogInfo:
     events: dict[str, int]
     attachments: list[str]
     start: dict[str, str]
+    versions: dict[str, str]
     summary: dict[str, Any]
 
     @property
@@ -116,7 +118,8 @@ def inspect(path: str | os.PathLike[str]) -> LogInfo:
         events=dict(Counter(event.level for event in log.events())),
         attachments=list(log.attachments),
         start=log.start,
-        summary=_summary(log),
+        versions=_json_map(log.attachments.get("versions.json", ("", b"{}"))[1]),
+        summary=_json_map((log.stop or {}).get("summary", "{}")),
     )
 
 
@@ -162,9 +165,10 @@ def _spread(seconds: NDArray[np.float64]) -> Spread | None:
     return Spread(median, high, most)
 
 
-def _summary(log: Log) -> dict[str, Any]:
+def _json_map(text: str | bytes) -> dict[str, Any]:
+    """Map that a text holds as JSON; empty if it is something else."""
     try:
-        summary = json.loads((log.stop or {}).get("summary", "{}"))
+        found = json.loads(text)
     except ValueError:
         return {}
-    return summary if isinstance(summary, dict) else {}
+    return found if isinstance(found, dict) else {}

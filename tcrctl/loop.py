@@ -20,7 +20,7 @@ from tcrctl.estimator.estimator import Estimator
 from tcrctl.pacing import Pace
 from tcrctl.plant.plant import Plant
 from tcrctl.safety import SafetyGuard, SafetyLimits
-from tcrctl.signals import Command, Measurement, StepRecord, Timing
+from tcrctl.signals import Array, Command, Measurement, StepRecord, Timing
 from tcrctl.trajectory.trajectory import Trajectory, sample_reference
 
 
@@ -32,6 +32,15 @@ def step_count(duration: float, period: float) -> int:
 def still(measured: Measurement) -> Command:
     """Return the command that holds the drives where they were measured."""
     return Command(np.zeros_like(measured.drive), measured.drive.copy())
+
+
+def in_periods(ahead: Array, period: float) -> Array:
+    """Return prediction instants ``ahead`` (n,) [s] in periods, so that ``(k + ahead) * period`` is their time.
+
+    An instant that several steps look at then has the same bits in all of them, and so has its reference: in the
+    log all but one are a repetition, which the compressor removes.
+    """
+    return np.asarray(np.round(ahead / period, 9))
 
 
 def run_loop(
@@ -68,13 +77,14 @@ def run_loop(
         LogError: If a step could not be recorded.
     """
     guard, applied, now = SafetyGuard(limits), None, pace.now
+    ahead = in_periods(controller.ahead, period)
     for k in range(step_count(duration, period)):
         late, t0 = pace.wait(k * period), now()
         measured, truth = plant.read(), plant.truth()
         t1 = now()
         estimate = estimator.update(measured, still(measured) if applied is None else applied)
         t2 = now()
-        reference = sample_reference(trajectory, k * period, k * period + controller.ahead)
+        reference = sample_reference(trajectory, k * period, (k + ahead) * period)
         wanted, info = controller.control(estimate, reference)
         t3 = now()
         broken = guard.check(k, reference, estimate, wanted, info)

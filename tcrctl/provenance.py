@@ -6,6 +6,7 @@ import datetime
 import hashlib
 import importlib.metadata
 import json
+import os
 import platform
 import socket
 import sys
@@ -52,12 +53,17 @@ def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str
 
 def versions() -> dict[str, str]:
     """Versions of everything that the numbers of a run depend on, and a digest of this program's source."""
+    import llvmlite.binding as llvm  # heavy
+
+    cpu = llvm.get_host_cpu_name()  # type: ignore[no-untyped-call]  # decides what kernels are compiled to
     found = {
         "tcrctl": __version__,
         "source_sha256": source_digest(),
         "python": sys.version.split()[0],
         "platform": platform.platform(),
-        "processor": platform.processor() or platform.machine(),
+        "processor": processor(),
+        "cpu": cpu,
+        "numba_opt": os.environ.get("NUMBA_OPT", "default"),
     }
     for package in _PACKAGES:
         try:
@@ -65,6 +71,16 @@ def versions() -> dict[str, str]:
         except importlib.metadata.PackageNotFoundError:
             found[package] = "unknown"
     return found
+
+
+def processor() -> str:
+    """Model name of the processor, or of its kind if the system does not say."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    named = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+    return named or platform.processor() or platform.machine()
 
 
 def source_digest() -> str:

@@ -103,6 +103,7 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool) -> L
             period_s=experiment.period,
             flush_s=spec.log.flush_s,
             flush_steps=spec.log.flush_steps,
+            full_state_s=spec.full_state_s,
             fsync=spec.log.fsync,
             wait_when_full=not realtime,
         )

@@ -181,6 +181,20 @@ class Timing:
 
 
 @dataclass(frozen=True, slots=True)
+class Checksums:
+    """32-bit digests that stand for what a log leaves out, and that betray what was changed in it.
+
+    Attributes:
+        given: Of measurement and reference.
+        state: Of the full state: positions, velocities and disturbance of the estimate, and inner variables of the
+            controller.
+    """
+
+    given: int
+    state: int
+
+
+@dataclass(frozen=True, slots=True)
 class StepRecord:
     """Everything that entered or left the controller in one step.
 
@@ -191,6 +205,7 @@ class StepRecord:
         wanted: Command before limits.
         applied: Command after limits: what was really sent.
         truth: Simulated truth, or None on a rig.
+        checksums: Added by the log; None before.
     """
 
     k: int
@@ -204,3 +219,4 @@ class StepRecord:
     info: ControlInfo
     truth: Truth | None
     timing: Timing
+    checksums: Checksums | None = None

@@ -9,6 +9,7 @@ import difflib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -16,7 +17,7 @@ from tcrctl import shipped, strict_yaml
 from tcrctl.controller.settings import ControllerSettings, IocSettings
 from tcrctl.criterion import CriterionText
 from tcrctl.errors import InputError, Problem, SpecError
-from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
+from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
 from tcrctl.kind_switch import without_former_keys
 from tcrctl.plant.rig_file import LoadedRig, load_rig
 from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings, rings_named
@@ -29,13 +30,28 @@ from tcrctl.task.settings import TaskSettings
 from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.settings import TrajectorySettings, named_targets
 
+#: Control rate up to which ``full_state_s: auto`` means every step [Hz].
+_RICH_RATE_HZ: Final = 20.0
+
 
 class LogSettings(Settings):
-    """How often the log reaches the disk; flushed at the earlier of the two."""
+    """How much of the steps is logged, and how often it reaches the disk: at the earlier of the two intervals."""
 
     flush_s: float = quantity("s", "longest time between two flushes", 0.5, gt=0)
     flush_steps: int = Field(default=500, ge=1, description="most control steps between two flushes")
     fsync: bool = Field(default=False, description="wait until the disk has the data, against power failure")
+    full_state_s: Literal["auto"] | Annotated[float, Field(ge=0)] = quantity(
+        "s",
+        "time between two steps with all node positions, velocities and forces (0: every step), which replay "
+        "computes again; auto: every step at up to 20 Hz, else 1 s",
+        "auto",
+    )
+
+    def full_state(self, period: float) -> float:
+        """Time between two steps that are logged in full at a control period [s]; 0: every step."""
+        if self.full_state_s != "auto":
+            return self.full_state_s
+        return 0.0 if period * _RICH_RATE_HZ > 1.0 - 1e-9 else 1.0
 
 
 class SafetySettings(Settings):
@@ -73,6 +89,12 @@ class ExperimentSpec(Settings):
     safety: SafetySettings = SafetySettings()
     start: StartSettings = StartSettings()
     log: LogSettings = LogSettings()
+
+    @property
+    def full_state_s(self) -> float:
+        """Time between two steps that are logged in full [s]; an exact state is input, so every step has to be."""
+        exact = isinstance(self.estimator, ExactSettings)
+        return 0.0 if exact else self.log.full_state(self.controller.period_s)
 
     @model_validator(mode="after")
     def _sections_agree(self) -> ExperimentSpec:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -16,9 +17,9 @@ from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.recover import recover
 from tcrctl.errors import InputError, LogError, TcrctlError
-from tcrctl.export import export_csv
+from tcrctl.export import export_csv, export_parquet
 from tcrctl.info import inspect
-from tcrctl.log.columns import COLUMNS
+from tcrctl.log.columns import COLUMNS, meanings
 from tcrctl.log.reader import read_log
 
 N_STEPS = 50
@@ -195,6 +196,25 @@ def test_an_npz_holds_every_quantity_as_logged(log):
             assert arrays["measurement_nodes_m"][k].tobytes() == step.measurement.nodes.tobytes()
 
 
+def test_a_parquet_file_has_the_columns_and_bits_of_the_csv(log, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    assert tcrctl("export", log, "--parquet", "--nodes")[0] == 0
+    table = parquet.read_table(log.with_suffix(".parquet"))
+    assert table.column_names == export_csv(log, tmp_path / "all.csv", nodes=True)
+    for name, expected in (("t_s", lambda s: s.t), ("applied_speed_c2_m_s", lambda s: s.applied.speed[1])):
+        assert table[name].to_pylist() == [expected(records.record(k)) for k in range(N_STEPS)]
+    assert str(table.schema.field("measurement_nodes_m1_n1_x_m").type) == "float"
+    assert str(table.schema.field("info_saturated_c1").type) == "bool"
+
+
+def test_parquet_without_its_package_names_what_to_install(log, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(InputError, match="pyarrow") as caught:
+        export_parquet(log, log.with_suffix(".parquet"))
+    assert "tcrctl[parquet]" in caught.value.hint
+    assert not log.with_suffix(".parquet").exists()
+
+
 def test_an_unfinished_log_exports_what_it_has(cut, tmp_path):
     export_csv(cut, tmp_path / "cut.csv")
     with open(tmp_path / "cut.csv", newline="") as stream:
@@ -222,6 +242,18 @@ def test_what_cannot_be_read_exits_2(verb, tmp_path):
         assert (code, out) == (2, "")
         assert str(path) in message
     assert sorted(tmp_path.iterdir()) == [text]
+
+
+def test_every_column_is_listed_with_unit_and_meaning():
+    code, out, _ = tcrctl("export", "--columns")
+    listed = {line.split()[0]: line for line in out.splitlines() if line.strip()}
+    assert code == 0
+    assert set(COLUMNS) <= set(listed)
+    assert "at the end of the horizon (m,) [N]" in " ".join(out.split())
+    said = meanings()
+    assert set(said) == set(COLUMNS)
+    assert said["estimate_tension"] == "Cable tensions of the model (m,) [N]."
+    assert [name for name in COLUMNS if not said[name] and not name.startswith(("k", "t"))] == []
 
 
 def test_export_wants_one_format(log):

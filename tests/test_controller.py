@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
+from tcrctl.controller.blocks import block_edges, superpose
 from tcrctl.controller.controller import build_controller
 from tcrctl.controller.cost import outputs
 from tcrctl.controller.integral import IntegralAction
-from tcrctl.controller.multi_step import MultiStep, block_edges, superpose
+from tcrctl.controller.multi_step import MultiStep
 from tcrctl.controller.settings import CostWeights, IntegralSettings, IocSettings, KinematicSettings
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.settings import PassiveObserverSettings

@@ -34,19 +34,19 @@ def random_case(seed: int, blocks: int = 3, instants: int = 8, floor: float = -n
     free[:, POSE_ROWS:] = 3.0 + 3.0 * rng.standard_normal((instants, M))
     output = np.array([7.2e4] * 3 + [44.0] * 3 + [1e-3] + [1e-5] * M)
     weights = Weights(output, 1.0, 3.5e3, floor, 60.0 if np.isfinite(floor) else np.inf, 1e-3)
-    target, previous = np.zeros((instants, POSE_ROWS + M)), 0.02 * rng.standard_normal(M)
+    target, changes = np.zeros((instants, POSE_ROWS + M)), 0.02 * rng.standard_normal(blocks * M)
     high = np.full(blocks * M, 0.05)
-    return Prediction(free, gain), target, previous, -high, high, weights
+    return Prediction(free, gain), target, changes, -high, high, weights
 
 
 def cost(case, U: np.ndarray) -> float:
     """The cost (30), written out from its definition, halved; soft rows with quadratic slack."""
-    prediction, target, previous, _, _, weights = case
+    prediction, target, changes, _, _, weights = case
     Y = prediction.free + prediction.gain @ U
     value = 0.5 * np.sum(weights.output * (Y - target) ** 2)
-    u = np.vstack([previous, U.reshape(-1, M)])
-    value += 0.5 * weights.speed * np.sum(u[1:] ** 2)
-    value += 0.5 * weights.speed_change * np.sum(np.diff(u, axis=0) ** 2)
+    u = np.vstack([np.zeros(M), U.reshape(-1, M)])
+    value += 0.5 * weights.speed * np.sum(u**2)
+    value += 0.5 * weights.speed_change * np.sum((np.diff(u, axis=0) - changes.reshape(-1, M)) ** 2)
     T = Y[:, POSE_ROWS:]
     low = np.maximum(weights.floor - T, 0.0) if np.isfinite(weights.floor) else np.zeros(1)
     high = np.maximum(T - weights.ceiling, 0.0) if np.isfinite(weights.ceiling) else np.zeros(1)

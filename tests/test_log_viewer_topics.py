@@ -47,7 +47,7 @@ def test_frames_on_tf_carry_ring_coordinates_to_the_world(finished):
             rotation = Rotation.from_quat([getattr(frame.rotation, axis) for axis in "xyzw"])
             origin = np.array([getattr(frame.translation, axis) for axis in "xyz"])
             radius = np.linalg.norm(module[0] - module[:3].mean(axis=0))
-            np.testing.assert_allclose(rotation.apply([radius, 0, 0]) + origin, module[0], atol=3e-6)
+            np.testing.assert_allclose(rotation.apply([radius, 0, 0]) + origin, module[0], atol=3e-5)
             assert rotation.apply([0, 0, 1])[2] > 0.9
             checked += 1
     assert checked == 4 * 40
@@ -56,7 +56,7 @@ def test_frames_on_tf_carry_ring_coordinates_to_the_world(finished):
 def test_the_scene_draws_every_rod_and_colours_cables_by_tension(finished):
     steps = {step.k: step for step in read_log(finished).steps()}
     scenes = list(_messages(finished, "/scene"))
-    assert [message.sequence for _, message in scenes] == list(range(0, 40, 2))
+    assert [message.sequence for _, message in scenes] == list(range(0, 40, 4))
     for schema, message in scenes:
         assert schema.name == "foxglove.SceneUpdate"
         entities = {entity.id: entity for entity in _decoded(schema, message).entities}

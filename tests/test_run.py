@@ -7,21 +7,26 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from log_files import doctor
 from numba.core.dispatcher import Dispatcher
 from short_runs import ROOT, SHORT, arguments, short_spec, start
 
 from tcrctl.cli.app import main
-from tcrctl.errors import DeviceError, DivergenceError, LogError
+from tcrctl.controller.instantaneous import InstantaneousOptimalControl
+from tcrctl.errors import DeviceError, DivergenceError, InputError, LogError
 from tcrctl.experiment import prepare
 from tcrctl.info import inspect
 from tcrctl.log.reader import read_log
+from tcrctl.log.recover import recover
 from tcrctl.log.writer import LogWriter
 from tcrctl.plant.simulated import SimulatedPlant
+from tcrctl.replay.replay import replay
 from tcrctl.run import run_experiment
 from tcrctl.run_folder import make_run_folder
 from tcrctl.spec import load_spec
@@ -210,6 +215,27 @@ def test_a_fault_of_the_program_leaves_a_finished_log_and_a_closed_plant(short, 
     assert "a bug" in log.stop["reason"]
 
 
+def test_a_controller_that_raises_leaves_a_finished_log_and_a_closed_plant(short, tmp_path, monkeypatch):
+    closed = failing_plant(monkeypatch, DeviceError("unused"))
+    control = InstantaneousOptimalControl.control
+
+    def failing_control(self, estimate, reference):
+        if reference.t > 0.38:
+            raise FloatingPointError("a bug of the controller")
+        return control(self, estimate, reference)
+
+    monkeypatch.setattr(InstantaneousOptimalControl, "control", failing_control)
+    with pytest.raises(FloatingPointError):
+        run_experiment(short, out=tmp_path)
+    (path,) = tmp_path.glob("*/log.mcap")
+    log = read_log(path)
+    assert (log.complete, log.stop["status"], len(closed)) == (True, "error", 1)
+    assert "a bug of the controller" in log.stop["reason"]
+    assert [step.k for step in log.steps()] == list(range(8))
+    assert doctor(path).returncode == 0
+    assert not recover(path, tmp_path / "copy.mcap").lossy
+
+
 def test_a_second_ctrl_c_leaves_a_finished_log_and_a_closed_plant(short, tmp_path, monkeypatch):
     closed = failing_plant(monkeypatch, DeviceError("unused"))
 
@@ -240,6 +266,24 @@ def test_a_disk_that_fills_up_is_an_error_and_the_plant_is_closed(short, tmp_pat
     assert (summary.status, summary.exit_code, summary.measures.steps) == ("error", 5, 12)
     assert "No space left" in summary.reason
     assert len(closed) == 1
+
+
+def test_a_run_on_a_file_system_that_is_full_says_so_in_its_log(tiny_filesystem, tmp_path, capsys):
+    options = ["--json", "--out", str(tiny_filesystem), *arguments("trajectory.settle_s=5")]
+    assert main(["run", "letter_t", *options, "--set", "log.flush_steps=20"]) == 5
+    result = json.loads(capsys.readouterr().out)
+    log = read_log(result["log"])
+    steps = [step.k for step in log.steps()]
+    assert result["status"] == log.stop["status"] == "error"
+    assert "No space left on device" in result["reason"]
+    assert "No space left on device" in log.stop["reason"]
+    assert steps == list(range(len(steps)))
+    assert 0 <= result["steps"] - len(steps) <= 20
+    mended = recover(log.path, tmp_path / "mended.mcap")
+    assert (mended.steps, mended.lossy) == (len(steps), True)
+    assert doctor(mended.path).returncode == 0
+    found = replay(log.path)
+    assert (found.status, found.compared) == ("incomplete", len(steps))
 
 
 def test_a_run_beyond_the_safety_limit_is_aborted_with_exit_code_4(short, tmp_path):
@@ -371,8 +415,9 @@ def once_running(folder, steps=30):
     end = time.monotonic() + 240.0  # the kernels may have to be compiled
     while time.monotonic() < end:
         for path in folder.glob("*/log.mcap"):
-            if sum(1 for _ in read_log(path).steps()) >= steps:
-                return path
+            with suppress(InputError):  # nothing has reached the disk yet
+                if sum(1 for _ in read_log(path).steps()) >= steps:
+                    return path
         time.sleep(0.1)
     raise TimeoutError(f"no run in {folder}")
 
@@ -397,6 +442,7 @@ def test_a_signal_ends_a_run_with_a_complete_log(running, name, number, code):
     assert "Traceback" not in err
     result = json.loads((path.parent / "summary.json").read_text())
     assert (result["status"], result["steps"]) == ("aborted", len(steps))
+    assert doctor(path).returncode == 0
     if name == "json":
         assert json.loads(out) == result
     else:
@@ -416,6 +462,10 @@ def test_a_killed_run_keeps_all_steps_but_those_of_the_last_flush_interval(runni
     assert steps == list(range(len(steps)))
     flushed = elapsed - 0.5 - 0.3  # flush interval, and time for a busy machine
     assert len(steps) >= flushed / 0.05
+    mended = recover(path, path.with_name("mended.mcap"))
+    assert (mended.steps, mended.lossy) == (len(steps), True)
+    assert doctor(mended.path).returncode == 0
+    assert replay(mended.path).status == "identical"
 
 
 def test_paced_steps_begin_a_period_apart(running):

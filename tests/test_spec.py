@@ -199,3 +199,27 @@ def test_a_criterion_compares_as_it_reads_and_nan_meets_none(criterion: Criterio
 def test_sentences_that_are_no_criterion_are_refused(text: str) -> None:
     with pytest.raises(ValidationError, match="name relation number"):
         TypeAdapter(CriterionText).validate_python(text)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "seconds"),
+    [
+        ((), 0.0),
+        (("controller.period_s=0.02",), 1.0),
+        (("controller.period_s=0.02", "log.full_state_s=0.1"), 0.1),
+        (("controller.period_s=0.02", "log.full_state_s=0"), 0.0),
+        (("log.full_state_s=2",), 2.0),
+        (("log.full_state_s=2", "estimator={kind: exact}"), 0.0),
+    ],
+)
+def test_the_full_state_is_logged_every_step_up_to_20_hz_or_as_asked(
+    tmp_path: Path, overrides: tuple[str, ...], seconds: float
+) -> None:
+    assert loaded(tmp_path, *overrides).spec.full_state_s == seconds
+
+
+@pytest.mark.parametrize("value", ["fast", "-1", "[1]", "true"])
+def test_an_interval_of_the_full_state_is_auto_or_a_time(tmp_path: Path, value: str) -> None:
+    (problem,) = problems_of(tmp_path, f"log.full_state_s={value}")
+    assert problem.startswith("--set log.full_state_s: must be 'auto', not ")
+    assert "must be " in problem.partition("; ")[2]

@@ -9,9 +9,9 @@ import pytest
 from pydantic import ValidationError
 from test_controller import closed_loop, constant, ioc, pose_settings, resting
 
+from tcrctl.controller.blocks import block_edges
 from tcrctl.controller.controller import build_controller
 from tcrctl.controller.cost import outputs
-from tcrctl.controller.multi_step import block_edges
 from tcrctl.controller.settings import OffsetSettings
 from tcrctl.controller.static import Static
 from tcrctl.plant.settings import Mismatch

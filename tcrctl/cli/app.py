@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from tcrctl import __version__
+from tcrctl.cli.diff import diff
 from tcrctl.cli.emulate import emulate
 from tcrctl.cli.export import export
 from tcrctl.cli.info import info
@@ -19,6 +20,7 @@ from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.paper import paper
 from tcrctl.cli.recover import recover
+from tcrctl.cli.replay import replay
 from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
@@ -40,6 +42,8 @@ VERBS: dict[str, Callable[..., None]] = {
     "export": export,
     "emulate": emulate,
     "paper": paper,
+    "replay": replay,
+    "diff": diff,
 }
 
 

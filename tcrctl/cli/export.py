@@ -13,33 +13,62 @@ from tcrctl.cli.log_file import LogFile
 from tcrctl.cli.options import AsJson
 
 
+def _print_columns(wanted: bool) -> None:
+    if not wanted:
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from tcrctl.log.columns import COLUMNS, meanings
+
+    table, said = Table("column", "unit", "meaning", box=None), meanings()
+    for name, column in COLUMNS.items():
+        table.add_row(name, column.unit, escape(said.get(name, "")))
+    Console().print(table)
+    raise typer.Exit()
+
+
 def export(
     log: LogFile,
     as_csv: Annotated[bool, typer.Option("--csv", help="One row per step, one column per number.")] = False,
     as_npz: Annotated[bool, typer.Option("--npz", help="One numpy array per quantity.")] = False,
+    as_parquet: Annotated[
+        bool,
+        typer.Option("--parquet", help="As CSV, in Apache Parquet; needs pip install 'tcrctl[parquet]'."),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", metavar="FILE", help="File to write; default: LOG with the new suffix."),
     ] = None,
-    nodes: Annotated[bool, typer.Option("--nodes", help="CSV: also every node and marker.")] = False,
+    nodes: Annotated[bool, typer.Option("--nodes", help="CSV, Parquet: also every node and marker.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    columns: Annotated[
+        bool,
+        typer.Option("--columns", help="List all columns and exit.", callback=_print_columns, is_eager=True),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write the steps of a log as CSV or npz; names end in the SI unit, e.g. estimate_position_x_m.
+    """Write the steps of a log as CSV, npz or Parquet; names end in the SI unit, e.g. estimate_position_x_m.
 
     Examples:
       tcrctl export log.mcap --csv
       tcrctl export log.mcap --npz -o run.npz
+      tcrctl export log.mcap --parquet --nodes
+      tcrctl export --columns
     """
+    del columns
     from tcrctl.errors import InputError
-    from tcrctl.export import export_csv, export_npz
+    from tcrctl.export import export_csv, export_npz, export_parquet
 
-    if as_csv == as_npz:
-        raise InputError("give one format: --csv or --npz")
-    target = out or log.with_suffix(".csv" if as_csv else ".npz")
-    names = (
-        export_csv(log, target, nodes=nodes, force=force) if as_csv else export_npz(log, target, force=force)
-    )
+    if as_csv + as_npz + as_parquet != 1:
+        raise InputError("give one format: --csv, --npz or --parquet")
+    target = out or log.with_suffix(".csv" if as_csv else ".npz" if as_npz else ".parquet")
+    if as_npz:
+        names = export_npz(log, target, force=force)
+    else:
+        write = export_csv if as_csv else export_parquet
+        names = write(log, target, nodes=nodes, force=force)
     if as_json:
         print(json.dumps({"status": "ok", "file": str(target), "columns": names}))
     else:

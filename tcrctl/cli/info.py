@@ -34,7 +34,8 @@ def _print_tables(found: LogInfo) -> None:
     from rich.table import Table
 
     console = Console()
-    for title, rows in (("", _facts(found)), ("provenance", found.start), ("criteria", _criteria(found))):
+    provenance = {**found.start, **found.versions}
+    for title, rows in (("", _facts(found)), ("provenance", provenance), ("criteria", _criteria(found))):
         if not rows:
             continue
         table = Table(title=title, title_justify="left", show_header=False, box=None)

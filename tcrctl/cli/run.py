@@ -43,12 +43,11 @@ def run(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    r"""Run an experiment and record every control step.
+    """Run an experiment and record every control step.
 
     The result goes to a new folder DIR/TIME_NAME_ID with log.mcap, spec.yaml, spec.resolved.yaml and
     summary.json. Ctrl-C or SIGTERM stop a run safely between two steps; a second Ctrl-C stops it at once.
 
-    \b
     Examples:
       tcrctl run letter_t
       tcrctl run letter_t --set plant.mismatch=off --seed 7

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from tcrctl.controller.cost import input_limits, make_target, make_weights, outputs, pose_error
+from tcrctl.controller.feedforward import needed_speeds, reference_poses, wanted_changes
 from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.ioc import Solution, build_ioc, solve_ioc
@@ -51,7 +52,7 @@ class InstantaneousOptimalControl:
         self._weights = make_weights(settings, robot.n_cables, self._predictor.ahead.size)
         self._integral = IntegralAction(settings.integral, settings.period_s)
         self._normal = robot.rest_normal if settings.output == "pose" else None
-        self._speed = np.zeros(robot.n_cables)
+        self._speed, self._needed = np.zeros(robot.n_cables), np.zeros(robot.n_cables)
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
         self.ahead = self._predictor.ahead
 
@@ -59,6 +60,7 @@ class InstantaneousOptimalControl:
         """Last input, integral action, and what the predictor keeps."""
         return {
             "speed": Kept(self._speed, SPEED),
+            "needed": Kept(self._needed, SPEED),
             **self._integral.memory(self._normal),
             **self._predictor.memory(),
         }
@@ -80,7 +82,8 @@ class InstantaneousOptimalControl:
         reason = _doubt(estimate, forecast)
         if not reason:
             target = make_target(self._settings, reference, shift, self._robot.n_cables)
-            problem = build_ioc(forecast.prediction, target, self._speed, low, high, self._weights)
+            changes = self._free_changes(forecast, reference)
+            problem = build_ioc(forecast.prediction, target, changes, low, high, self._weights)
             solution = Solution(*solve_ioc(problem, forecast.prediction, self._weights))
             if not (solution.solved and solution.residual <= LCP_TOLERANCE):
                 reason = f"the complementarity problem was not solved (residual {solution.residual:.2g})"
@@ -88,6 +91,8 @@ class InstantaneousOptimalControl:
         self._speed = (
             np.zeros(m) if reason else np.minimum(np.maximum(solution.inputs[:m], low[:m]), high[:m])
         )
+        if reason:  # from standstill the speed that the reference needs is a free change
+            self._needed = np.zeros(m)
         limit = self._settings.speed_limit_mm_s / 1000.0
         self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
         info = ControlInfo(
@@ -102,6 +107,17 @@ class InstantaneousOptimalControl:
             reason=reason,
         )
         return Command(self._speed, estimate.drive + self._settings.period_s * self._speed), info
+
+    def _free_changes(self, forecast: Forecast, reference: Reference) -> Array:
+        """Changes of speed that cost nothing (blocks * m,) [m/s]; see :mod:`tcrctl.controller.feedforward`."""
+        blocks, m = self._predictor.blocks, self._robot.n_cables
+        needed = np.zeros((blocks, m))
+        if self._settings.feedforward and forecast.rest_gain is not None:
+            weights, poses = self._weights.output[:6], reference_poses(reference)
+            needed = needed_speeds(forecast.rest_gain, weights, poses, self._predictor.edges, self.ahead[0])
+        changes = wanted_changes(self._speed, self._needed, needed)
+        self._needed = needed[0].copy()
+        return changes
 
 
 def _doubt(estimate: Estimate, forecast: Forecast) -> str:

@@ -97,20 +97,21 @@ class Solution(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def build_ioc(
-    prediction: Prediction, target: Array, previous: Array, low: Array, high: Array, weights: Weights
+    prediction: Prediction, target: Array, changes: Array, low: Array, high: Array, weights: Weights
 ) -> Problem:
     """Assemble (32) for an affine prediction.
 
     Args:
         prediction: Predicted outputs.
         target: Outputs wanted (n, 7 + m).
-        previous: Input of the last step u_k (m,) [m/s].
+        changes: Changes of speed from block to block that cost nothing, the first one from standstill
+            (blocks * m,) [m/s]: the input u_k of the last step, then zeros, is (30).
         low: Lower limits of the inputs (blocks * m,) [m/s].
         high: Upper limits (blocks * m,) [m/s].
         weights: Weights of the cost.
     """
     gain = prediction.gain
-    n, rows, size, m = gain.shape[0], gain.shape[1], gain.shape[2], previous.shape[0]
+    n, rows, size, m = gain.shape[0], gain.shape[1], gain.shape[2], prediction.free.shape[1] - POSE_ROWS
     H, g = np.zeros((size, size)), np.zeros(size)
     for i in range(n):
         for r in range(rows):
@@ -125,9 +126,9 @@ def build_ioc(
                         H[a, b] += s * gain[i, r, b]
     for a in range(size):
         H[a, a] += weights.speed + weights.speed_change
-        if a < m:
-            g[a] -= weights.speed_change * previous[a]
-        else:
+        g[a] -= weights.speed_change * changes[a]
+        if a >= m:
+            g[a - m] += weights.speed_change * changes[a]
             H[a - m, a - m] += weights.speed_change
             H[a - m, a] -= weights.speed_change
     for a in range(size):

@@ -19,12 +19,13 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from tcrctl.controller.blocks import block_edges, superpose
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.predictor import Forecast
 from tcrctl.controller.settings import IocSettings
 from tcrctl.memory import POSITION, SPEED, Kept
-from tcrctl.robot import linear, response
+from tcrctl.robot import linear, pose, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.model import FIXED, Model
@@ -35,43 +36,6 @@ from tcrctl.signals import Array, Estimate
 #: Largest nodal force left in the model's equilibrium [N]: 1e-5 N moves the softest mode by 3 micrometres.
 TOLERANCE = 1e-5
 MAX_ITERATIONS = 40
-
-
-def block_edges(instants: int, blocks: int) -> Array:
-    """First instant of every block and the end (blocks + 1,): lengths grow about twofold, at least 1."""
-    edges = [0]
-    for b in range(1, blocks):
-        wanted = round(instants * (2**b - 1) / (2**blocks - 1))
-        edges.append(min(max(edges[-1] + 1, wanted), instants - (blocks - b)))
-    return np.array([*edges, instants], dtype=np.int64)
-
-
-@njit(cache=True, error_model="numpy")
-def superpose(change: Array, now: Array, edges: Array) -> tuple[Array, Array]:
-    """Outputs for piecewise constant speeds from the responses to ramps that begin now.
-
-    Args:
-        change: Responses (n, rows, m + 1) of robot.response.
-        now: Outputs at the state (rows,).
-        edges: Instants at which the blocks begin, and the end (blocks + 1,).
-
-    Returns:
-        free (n, rows) and gain (n, rows, blocks * m).
-    """
-    n, rows, m = change.shape[0], change.shape[1], change.shape[2] - 1
-    free, gain = np.empty((n, rows)), np.zeros((n, rows, (edges.shape[0] - 1) * m))
-    for i in range(n):
-        for r in range(rows):
-            free[i, r] = now[r] + change[i, r, m]
-        for b in range(edges.shape[0] - 1):
-            begun, ended = i - edges[b], i - edges[b + 1]
-            if begun >= 0:
-                for r in range(rows):
-                    for c in range(m):
-                        gain[i, r, b * m + c] = change[begun, r, c]
-                        if ended >= 0:
-                            gain[i, r, b * m + c] -= change[ended, r, c]
-    return free, gain
 
 
 class Memory(NamedTuple):
@@ -206,7 +170,7 @@ class MultiStep:
         self._robot, self._period = robot, settings.period_s
         self.ahead: Array = np.arange(1.0, settings.instants + 1.0) * (settings.horizon_s / settings.instants)
         self.blocks = settings.blocks
-        self._edges = block_edges(settings.instants, settings.blocks)
+        self.edges = block_edges(settings.instants, settings.blocks)
         offset = settings.offset
         self._blend = 0.0 if offset is None else -float(np.expm1(-settings.period_s / offset.filter_s))
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
@@ -251,11 +215,12 @@ class MultiStep:
         del speed  # the prediction is linear: it does not depend on the last input
         outcome, stable, free, gain = forecast(
             self._robot.model, self._load, self._work, self._memory, estimate.q + age * estimate.v, estimate.v,
-            estimate.drive, self._period, self._blend, self.ahead, self._edges, self._robot.tip,
+            estimate.drive, self._period, self._blend, self.ahead, self.edges, self._robot.tip,
             now,
         )  # fmt: skip
         outcome = Outcome(*outcome)
         good = outcome.converged and stable
         reason = "" if good else "the model has no stable equilibrium at the present drives"
         self._solved = outcome.converged
-        return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason)
+        at_rest = pose.drive_gain(self._memory.equilibrium, self._memory.gain, self._robot.tip)[:6]
+        return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from tcrctl.controller.blocks import block_edges
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.predictor import Forecast
@@ -32,7 +33,7 @@ class OneStep:
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
         self._robot, self._horizon = robot, settings.horizon_s
         self.ahead: Array = np.array([settings.horizon_s])
-        self.blocks = 1
+        self.blocks, self.edges = 1, block_edges(1, 1)
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._gain = np.zeros((self._work.r.shape[0], robot.n_cables))
         self._column = np.zeros(self._work.r.shape[0])

@@ -22,6 +22,7 @@ class Forecast:
         iterations: Newton iterations.
         residual: Largest nodal force left [N].
         reason: Empty, or why it cannot be trusted.
+        rest_gain: Derivatives of position and normal by the drives at rest (6, m), if it knows them.
     """
 
     prediction: Prediction
@@ -29,6 +30,7 @@ class Forecast:
     iterations: int
     residual: float
     reason: str = ""
+    rest_gain: Array | None = None
 
 
 class Predictor(Protocol):
@@ -37,10 +39,12 @@ class Predictor(Protocol):
     Attributes:
         ahead: Prediction instants after the step (n,) [s].
         blocks: Number of input blocks.
+        edges: Instants at which the blocks begin, and the end (blocks + 1,).
     """
 
     ahead: Array
     blocks: int
+    edges: Array
 
     def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
         """Predict from an estimate that is ``age`` [s] old.

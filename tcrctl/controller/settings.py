@@ -94,6 +94,11 @@ class IocSettings(Settings):
     offset: OrOff[OffsetSettings] = Field(
         default=OffsetSettings(), description="offset of the equilibrium, or off; prediction: multi_step only"
     )
+    feedforward: bool = Field(
+        default=True,
+        description="changes of drive speed are weighed against those that the reference needs, not against none; "
+        "prediction: multi_step only",
+    )
     weights: CostWeights = Field(default=CostWeights(), description="weights of the cost (30)")
     tension: OrOff[TensionSettings] = Field(
         default=TensionSettings(), description="keeps cables taut, or off"

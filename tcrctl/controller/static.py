@@ -17,9 +17,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from tcrctl.controller.blocks import block_edges, superpose
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
-from tcrctl.controller.multi_step import block_edges, follow, superpose
+from tcrctl.controller.multi_step import follow
 from tcrctl.controller.predictor import Forecast
 from tcrctl.controller.settings import IocSettings
 from tcrctl.elements.sliding_cable import STIFFNESS
@@ -131,7 +132,7 @@ class Static:
         self._robot = robot
         self.ahead: Array = np.arange(1.0, settings.instants + 1.0) * (settings.horizon_s / settings.instants)
         self.blocks = settings.blocks
-        self._edges = block_edges(settings.instants, settings.blocks)
+        self.edges = block_edges(settings.instants, settings.blocks)
         offset = settings.offset
         self._blend = 0.0 if offset is None else -float(np.expm1(-settings.period_s / offset.filter_s))
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
@@ -156,9 +157,10 @@ class Static:
         del age, speed  # at rest the past does not matter
         outcome, free, gain = forecast(
             self._robot.model, self._load, self._work, self._at, self._offset, estimate.drive, self._blend,
-            self.ahead, self._edges, self._robot.tip, now,
+            self.ahead, self.edges, self._robot.tip, now,
         )  # fmt: skip
         outcome = Outcome(*outcome)
         reason = "" if outcome.converged else "the model has no stable equilibrium at the present drives"
         prediction, self._solved = Prediction(free, gain), outcome.converged
-        return Forecast(prediction, outcome.converged, outcome.iterations, outcome.residual, reason)
+        at_rest = pose.drive_gain(self._at.equilibrium, self._at.gain, self._robot.tip)[:6]
+        return Forecast(prediction, outcome.converged, outcome.iterations, outcome.residual, reason, at_rest)

@@ -8,10 +8,10 @@ metadata ``tcrctl.run.start``, first   -                            who, when, w
 ``/tcrctl/step``                       ``tcrctl.v1.Step``           one message per step, sequence = k
 ``/tcrctl/event``, ``/log``            ``tcrctl.v1.Event``,         phase changes, limit trips, stops
                                        ``foxglove.Log``
-``/tf``                                ``foxglove.FrameTransforms``  ring frames in the world, <= 60 Hz
-``/tip/measured``, ``/tip/reference``  ``foxglove.PoseInFrame``     end poses, <= 60 Hz
-``/backbone``                          ``foxglove.PosesInFrame``    ring centres with orientation, <= 60 Hz
-``/scene``                             ``foxglove.SceneUpdate``     rings, rods, cables by tension, <= 10 Hz
+``/tf``                                ``foxglove.FrameTransforms``  ring frames in the world, <= 20 Hz
+``/tip/measured``, ``/tip/reference``  ``foxglove.PoseInFrame``     end poses, <= 20 Hz
+``/backbone``                          ``foxglove.PosesInFrame``    ring centres with orientation, <= 10 Hz
+``/scene``                             ``foxglove.SceneUpdate``     rings, rods, cables by tension, <= 5 Hz
 metadata ``tcrctl.run.stop``, last     -                            status, reason, criteria
 =====================================  ===========================  =========================================
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.log.event import Event
-from tcrctl.log.schema import MESSAGES, SCALARS, Field, wire_class
+from tcrctl.log.schema import MESSAGES, OPAQUE, SCALARS, Field, wire_class
 from tcrctl.signals import (
+    Checksums,
     Command,
     ControlInfo,
     Estimate,
@@ -31,6 +32,7 @@ _RECORDS: Final[dict[str, type]] = {
     "ControlInfo": ControlInfo,
     "Truth": Truth,
     "Timing": Timing,
+    "Checksums": Checksums,
     "Event": Event,
 }
 _WIRE: Final = {name: wire_class(name) for name in MESSAGES}
@@ -42,6 +44,9 @@ _DTYPES: Final[dict[str, np.dtype[Any]]] = {
     "int32[]": np.dtype("<i4"),
 }
 
+Fields: TypeAlias = frozenset[tuple[str, str]]
+"""Fields of message types, each as name of the type and of the field."""
+
 
 def encode(name: str, record: object) -> bytes:
     """Encode a record as message type ``name`` (a key of :data:`tcrctl.log.schema.MESSAGES`).
@@ -50,13 +55,24 @@ def encode(name: str, record: object) -> bytes:
         ValueError: If an array has another dtype or dimension than the schema says; a silent cast would make
             the log differ from what the controller saw.
     """
+    return bytes(filled(name, record).SerializeToString())
+
+
+def filled(name: str, record: object, omitted: Fields = frozenset()) -> Any:
+    """Message of type ``name`` with the values of a record, but those of the fields ``omitted``.
+
+    Raises:
+        ValueError: As :func:`encode`.
+    """
     message = _WIRE[name]()
-    _fill(message, name, record)
-    return bytes(message.SerializeToString())
+    _fill(message, name, record, omitted)
+    return message
 
 
-def _fill(message: Any, name: str, record: object) -> None:
+def _fill(message: Any, name: str, record: object, omitted: Fields) -> None:
     for field in MESSAGES[name]:
+        if field.kind == OPAQUE or (name, field.name) in omitted:
+            continue
         value = getattr(record, field.name)
         if value is None and field.optional:
             continue
@@ -67,7 +83,7 @@ def _fill(message: Any, name: str, record: object) -> None:
         else:
             child = getattr(message, field.name)
             child.SetInParent()
-            _fill(child, field.kind, value)
+            _fill(child, field.kind, value, omitted)
 
 
 def _array_bytes(name: str, field: Field, value: NDArray[Any]) -> bytes:
@@ -87,13 +103,16 @@ def decode(name: str, data: bytes) -> Any:
     Raises:
         google.protobuf.message.DecodeError: If ``data`` is not such a message.
     """
-    return _record(_WIRE[name].FromString(data), name)
+    return record_of(parsed(name, data), name)
 
 
-def decode_step(data: bytes) -> StepRecord:
-    """Decode a ``/tcrctl/step`` message; its arrays are writable copies, equal bit for bit."""
-    step: StepRecord = decode("Step", data)
-    return step
+def parsed(name: str, data: bytes) -> Any:
+    """Message of type ``name``, arrays as bytes.
+
+    Raises:
+        google.protobuf.message.DecodeError: If ``data`` is not such a message.
+    """
+    return _WIRE[name].FromString(data)
 
 
 def decode_event(data: bytes) -> Event:
@@ -102,8 +121,13 @@ def decode_event(data: bytes) -> Event:
     return event
 
 
-def _record(message: Any, name: str) -> Any:
-    values = {field.name: _value(message, field) for field in MESSAGES[name]}
+def record_of(message: Any, name: str) -> Any:
+    """Record with the values of a parsed message of type ``name``.
+
+    Raises:
+        ValueError: If an array in it is no whole number of values.
+    """
+    values = {field.name: _value(message, field) for field in MESSAGES[name] if field.kind != OPAQUE}
     return _RECORDS[name](**values)
 
 
@@ -114,6 +138,6 @@ def _value(message: Any, field: Field) -> Any:
     if field.kind in SCALARS:
         return value
     if field.kind not in _DTYPES:
-        return _record(value, field.kind)
+        return record_of(value, field.kind)
     array: NDArray[Any] = np.frombuffer(value, _DTYPES[field.kind]).copy()
     return array.reshape(-1, field.width) if field.width else array

@@ -3,15 +3,17 @@
 ``estimate.position`` of :class:`tcrctl.signals.StepRecord` is column ``estimate_position`` with shape
 (n_steps, 3); ``truth.q`` is ``truth_q``, and so on for every field of every record. Units are those of the
 record, all SI (:data:`COLUMNS`). Where a step has no value (no normal in position-only tracking, fewer
-prediction instants than others, no camera frame in time) floats are NaN, integers -1, bools False. Columns of
-``truth`` (simulated plants) and ``measurement.raw`` (rigs) exist only if a step has them.
+prediction instants than others, no full state in a lean step, no camera frame in time) floats are NaN, integers -1,
+bools False. Columns of ``truth`` (simulated plants) and ``measurement.raw`` (rigs) exist only if a step has them.
 """
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
-from typing import Any, Final
+from dataclasses import dataclass, is_dataclass
+from typing import Any, Final, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +45,16 @@ class Column:
         return self.path.rpartition(".")[2]
 
 
+#: An entry under "Attributes:" in a docstring, with the lines that continue it.
+_ATTRIBUTE: Final = re.compile(r"^    (\w+): (.*(?:\n      .*)*)", re.MULTILINE)
+_NO_QUANTITIES: Final = ("checksums", "marker_planes", "marker_changes")
+
+
 def _columns(message: str = "Step", prefix: str = "") -> dict[str, Column]:
     found: dict[str, Column] = {}
     for field in MESSAGES[message]:
+        if field.name in _NO_QUANTITIES:
+            continue
         path = prefix + field.name
         if field.kind in MESSAGES:
             found |= _columns(field.kind, path + ".")
@@ -59,6 +68,22 @@ COLUMNS: Final = _columns()
 
 OPTIONAL: Final = ("truth", "measurement.raw")
 """Records that a step may lack."""
+
+
+def meanings(record: type = StepRecord, prefix: str = "") -> dict[str, str]:
+    """What every column is, by its name: the words of :mod:`tcrctl.signals`; empty where those say nothing."""
+    said = dict(_ATTRIBUTE.findall(inspect.cleandoc(record.__doc__ or "")))
+    found: dict[str, str] = {}
+    for name, kind in get_type_hints(record).items():
+        inner = next((part for part in (kind, *get_args(kind)) if is_dataclass(part)), None)
+        if name in _NO_QUANTITIES:
+            continue
+        if isinstance(inner, type):
+            found |= meanings(inner, f"{prefix}{name}_")
+        else:
+            found[prefix + name] = " ".join(said.get(name, "").split())
+    return found
+
 
 _DTYPES: Final[dict[str, Any]] = {
     "double": np.float64,

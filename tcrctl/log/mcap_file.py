@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
 from typing import IO, Any, Final
 
 from foxglove_schemas_protobuf.Log_pb2 import Log as FoxgloveLog
-from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
+from mcap.data_stream import RecordBuilder
+from mcap.records import DataEnd, Footer, Metadata
+from mcap.writer import LIBRARY_IDENTIFIER, MCAP0_MAGIC, CompressionType, Writer
 
 from tcrctl import __version__
 from tcrctl.log.codec import encode
 from tcrctl.log.event import LEVELS, Event
 from tcrctl.log.geometry import LogGeometry
 from tcrctl.log.schema import VERSION, descriptor_set, public_descriptor, units
+from tcrctl.log.steps import StepEncoder
 from tcrctl.log.viewer_topics import TOPICS, ViewerTopics, stamp
 from tcrctl.signals import StepRecord
 
@@ -23,17 +29,31 @@ STOP: Final = "tcrctl.run.stop"
 STEP_TOPIC: Final = "/tcrctl/step"
 EVENT_TOPIC: Final = "/tcrctl/event"
 LOG_TOPIC: Final = "/log"
+#: Entry of a stop record that was written after steps were lost.
+TRUNCATED: Final = "truncated"
 LIBRARY: Final = f"tcrctl/{__version__} {LIBRARY_IDENTIFIER}"
 
 Attachments = Mapping[str, tuple[str, bytes]]
 
 
-def new_mcap(stream: IO[bytes]) -> Writer:
-    """Writer with the header of our logs, zstd chunks of at most 1 MiB."""
+_CHUNK_BYTES: Final = 2**20
+
+
+def new_mcap(stream: IO[bytes], chunk_size: int = _CHUNK_BYTES) -> Writer:
+    """Writer with the header of our logs; ends a zstd chunk by itself when it is longer than ``chunk_size``."""
     # Offsets into the summary are optional, and mcap writes wrong ones for groups without entries.
-    writer = Writer(stream, compression=CompressionType.ZSTD, use_summary_offsets=False)
+    writer = Writer(stream, chunk_size, CompressionType.ZSTD, use_summary_offsets=False)
     writer.start(profile="", library=LIBRARY)
     return writer
+
+
+def _end_of_file(stop: Mapping[str, str]) -> bytes:
+    """Stop record and the end of a file without index."""
+    builder: Any = RecordBuilder()
+    Metadata(name=STOP, metadata=dict(stop)).write(builder)
+    DataEnd(data_section_crc=0).write(builder)
+    Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(builder)
+    return bytes(builder.end()) + MCAP0_MAGIC
 
 
 class McapFile:
@@ -48,11 +68,16 @@ class McapFile:
         geometry: LogGeometry,
         epoch_ns: int,
         period_s: float,
+        full_state_s: float = 0.0,
     ) -> None:
         """Write everything that is known before the first step; see :class:`tcrctl.log.writer.LogWriter`."""
         self._stream, self._epoch_ns = stream, epoch_ns
         self._viewer = ViewerTopics(geometry, period_s)
-        self._writer: Any = new_mcap(stream)
+        self._encoder = StepEncoder(max(1, round(full_state_s / period_s)))
+        # Chunks end in flush() only, which lets the encoder begin anew.
+        self._writer: Any = new_mcap(stream, chunk_size=2**62)
+        self._chunk = 0
+        self._whole: list[int] = []  # where the file ended after each of the last two flushes
         for name, (media_type, data) in attachments.items():
             self._writer.add_attachment(epoch_ns, epoch_ns, name, media_type, data)
         own = {"log_schema": VERSION, "epoch_ns": str(epoch_ns), "period_s": repr(period_s)}
@@ -103,12 +128,14 @@ class McapFile:
 
     def step(self, record: StepRecord) -> None:
         """Write a step and the viewer topics due at it."""
+        if self._chunk >= _CHUNK_BYTES:
+            self.flush()
         now = self.time_ns(record.t)
         try:
             measured = self.time_ns(record.measurement.t)
         except ValueError:  # nothing measured yet: the field keeps the value, the index needs a number
             measured = now
-        self._add(STEP_TOPIC, now, encode("Step", record), record.k, measured)
+        self._add(STEP_TOPIC, now, self._encoder.encode(record), record.k, measured)
         for topic, data in self._viewer.messages(record, now):
             self._add(topic, now, data, record.k, now)
         self.steps += 1
@@ -125,18 +152,47 @@ class McapFile:
         self.unflushed += 1
 
     def _add(self, topic: str, log_time: int, data: bytes, sequence: int, publish_time: int) -> None:
+        self._chunk += len(data)
         self._writer.add_message(self._channels[topic], log_time, data, publish_time, sequence % 2**32)
 
     def flush(self, *, to_disk: bool = False) -> None:
         """End the chunk and hand it to the operating system, and to the disk if ``to_disk``."""
         self._writer.flush()
+        self._encoder.restart()
+        self._chunk = 0
         if to_disk:
             getattr(os, "fdatasync", os.fsync)(self._stream.fileno())
+        self._whole = [*self._whole[-1:], self._stream.tell()]
         self.unflushed = 0
+
+    def cut_short(self, path: Path, stop: Mapping[str, str]) -> None:
+        """After a failed write: cut off what is not whole, and write the stop record where that was.
+
+        If the room is not enough, the last whole chunk has to give way. There is no index; ``tcrctl recover`` makes
+        one.
+
+        Args:
+            path: The file.
+            stop: Content of the stop record; a mark is added that steps are missing.
+
+        Raises:
+            OSError: If the file system does not even take that.
+        """
+        # What the stream has not written yet must not come after the end.
+        getattr(self._stream, "raw", self._stream).close()
+        end = _end_of_file({**stop, TRUNCATED: "true"})
+        for whole in reversed(self._whole):
+            with suppress(OSError), open(path, "r+b", buffering=0) as file:
+                file.truncate(whole)
+                file.seek(whole)
+                if file.write(end) == len(end):
+                    return
+                file.truncate(whole)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def finish(self, stop: Mapping[str, str]) -> None:
         """Write the stop record, index and footer; ``steps`` is added to the record."""
-        self._writer.flush()
+        self.flush()
         self._writer.add_metadata(STOP, {"steps": str(self.steps), **stop})
         self._writer.finish()
         self._stream.flush()

@@ -14,10 +14,11 @@ from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metad
 from numpy.typing import NDArray
 
 from tcrctl.errors import InputError, LogError
-from tcrctl.log.codec import decode_event, decode_step
+from tcrctl.log.codec import decode_event
 from tcrctl.log.event import Event
 from tcrctl.log.mcap_file import EVENT_TOPIC, START, STEP_TOPIC, STOP
 from tcrctl.log.scan import Scan, check_is_mcap
+from tcrctl.log.steps import StepDecoder
 from tcrctl.signals import StepRecord
 
 
@@ -48,12 +49,17 @@ class Log:
     def steps(self) -> Iterator[StepRecord]:
         """Yield every step that is whole, in the order written, with arrays equal bit for bit.
 
+        A step that builds on one in a damaged chunk is lost with it.
+
         Raises:
             LogError: If the file is damaged inside, or a step is not one of this schema.
         """
+        decoder = StepDecoder()
         for message in self._messages(STEP_TOPIC):
             try:
-                yield decode_step(message.data)
+                step = decoder.decode(message.data)
+                if step is not None:
+                    yield step
             except (DecodeError, ValueError) as error:
                 raise LogError(self.path, f"step {message.sequence} cannot be decoded: {error}") from error
 

@@ -11,7 +11,7 @@ from typing import Any
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 
 from tcrctl.errors import InputError, LogError
-from tcrctl.log.mcap_file import STEP_TOPIC, STOP, new_mcap
+from tcrctl.log.mcap_file import STEP_TOPIC, STOP, TRUNCATED, new_mcap
 from tcrctl.log.reader import read_log
 from tcrctl.log.scan import Scan
 from tcrctl.log.writer import open_new
@@ -27,7 +27,8 @@ class Recovery:
         messages: Messages saved on all topics.
         attachments: Attachments saved.
         damaged_chunks: Chunks that had to be left out.
-        lossy: True if steps may be missing: the input had no stop record, or a chunk was damaged.
+        lossy: True if steps may be missing: the input had no stop record, the disk was full before it, or a chunk
+            was damaged.
     """
 
     path: Path
@@ -122,7 +123,7 @@ def _recover_into(writer: Any, source: Path, target: Path) -> Recovery:
     scan = Scan(source)
     for record in itertools.chain(definitions, scan):
         copy.add(record)
-    lossy = copy.stop is None or scan.damaged_chunks > 0
+    lossy = copy.stop is None or TRUNCATED in copy.stop or scan.damaged_chunks > 0
     stop = copy.stop or {
         "status": "error",
         "reason": "not finished; recovered up to the last flush",

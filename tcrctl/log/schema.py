@@ -4,6 +4,12 @@ Every message type exists twice with the same wire format. The *public* one, sto
 declares an array as ``repeated double``. The *wire* one, used by our codec, declares the same field number as
 ``bytes``: a packed repeated field and a bytes field are both length-delimited, so an array is copied whole,
 NaN payloads included, instead of number by number.
+
+A step is written *in full* or *lean*. A lean step leaves out the fields of ``SPARSE``: node positions, velocities
+and forces, which replay computes again, and of which it holds digests (``checksums``). Its markers are input
+and cannot be left out; they are in ``marker_planes`` or ``marker_changes`` instead of ``measurement.nodes``, in a
+form that the compressor can shorten by a third (:mod:`tcrctl.log.steps`). How often a step is full is
+``log.full_state_s``.
 """
 
 from __future__ import annotations
@@ -25,6 +31,8 @@ SCALARS: Final = {
     "bool": _Proto.TYPE_BOOL,
     "string": _Proto.TYPE_STRING,
 }
+#: Not an attribute of a record: another form of what the record holds, written and read by the codec alone.
+OPAQUE: Final = "bytes"
 ARRAYS: Final = {
     "double[]": _Proto.TYPE_DOUBLE,
     "float[]": _Proto.TYPE_FLOAT,
@@ -39,7 +47,7 @@ class Field:
 
     Attributes:
         name: Attribute name in the record of :mod:`tcrctl.signals`.
-        kind: A key of ``SCALARS``, of ``ARRAYS``, or the name of a message type.
+        kind: A key of ``SCALARS``, of ``ARRAYS``, ``OPAQUE``, or the name of a message type.
         unit: Unit; empty if there is none.
         width: Second dimension of a two-dimensional array, 0 for one-dimensional ones.
         optional: True if the value may be None.
@@ -127,6 +135,13 @@ MESSAGES: Final[dict[str, tuple[Field, ...]]] = {
         Field("info", "ControlInfo"),
         Field("truth", "Truth", optional=True),
         Field("timing", "Timing"),
+        Field("checksums", "Checksums", optional=True),
+        Field("marker_planes", "bytes"),
+        Field("marker_changes", "bytes"),
+    ),
+    "Checksums": (
+        Field("given", "uint64"),
+        Field("state", "uint64"),
     ),
     "Event": (
         Field("t", "double", "s"),
@@ -136,11 +151,25 @@ MESSAGES: Final[dict[str, tuple[Field, ...]]] = {
     ),
 }
 
+SPARSE: Final = frozenset(
+    {
+        ("Estimate", "q"),
+        ("Estimate", "v"),
+        ("Estimate", "disturbance"),
+        ("ControlInfo", "predicted_tension"),
+        ("ControlInfo", "integral"),
+        ("Truth", "q"),
+    }
+)
+"""Message type and field of what a lean step leaves out; the arrays are then empty."""
+
 
 def _add_field(message: descriptor_pb2.DescriptorProto, number: int, field: Field, *, wire: bool) -> None:
     proto = message.field.add(name=field.name, number=number, label=_Proto.LABEL_OPTIONAL)
     if field.kind in SCALARS:
         proto.type = SCALARS[field.kind]
+    elif field.kind == OPAQUE:
+        proto.type = _Proto.TYPE_BYTES
     elif field.kind not in ARRAYS:
         proto.type, proto.type_name = _Proto.TYPE_MESSAGE, f".{PACKAGE}.{field.kind}"
     elif wire:

@@ -1,7 +1,7 @@
 """Topics derived from a step for viewers: frames, end poses, backbone and a 3-D scene.
 
-Nothing here is data: poses are rounded to 2^-20 m, the scene more coarsely, which is far below what a screen
-shows and lets the compressor remove most of it. Where a shape is not finite (a diverged or unseen robot),
+Nothing here is data: end poses are rounded to 2^-20 m, frames and scene more coarsely, which is far below what a
+screen shows and lets the compressor remove most of it. Where a shape is not finite (a diverged or unseen robot),
 nothing is drawn.
 """
 
@@ -30,8 +30,9 @@ TOPICS: Final[dict[str, Any]] = {
     "/backbone": PosesInFrame,
     "/scene": SceneUpdate,
 }
-VIEWER_RATE_HZ: Final = 60.0
-SCENE_RATE_HZ: Final = 10.0
+VIEWER_RATE_HZ: Final = 20.0
+SCENE_RATE_HZ: Final = 5.0
+_FRAME_GRID: Final = 2.0**16  # 15 micrometres: what draws the robot may be coarser than what is plotted
 
 
 def stride(period: float, rate_hz: float) -> int:
@@ -45,9 +46,9 @@ def stamp(time_ns: int) -> Timestamp:
     return Timestamp(seconds=seconds, nanos=nanos)
 
 
-def rounded(values: Array) -> list[list[float]]:
-    """Rows of ``values`` in multiples of 2^-20."""
-    rows: list[list[float]] = (np.round(values * 2.0**20) / 2.0**20).tolist()
+def rounded(values: Array, grid: float = 2.0**20) -> list[list[float]]:
+    """Rows of ``values`` in multiples of 1 / ``grid``."""
+    rows: list[list[float]] = (np.round(values * grid) / grid).tolist()
     return rows
 
 
@@ -84,7 +85,8 @@ class ViewerTopics:
             centre, turn = ring_frames(shape.reshape(-1, NODES_PER_MODULE, 3)[:, :3])
             if drawable(centre, turn):
                 yield "/tf", self._frames(centre, turn, when)
-                yield "/backbone", _backbone(centre, turn, when)
+                if record.k % (2 * self._viewer_stride) == 0:  # says the same as /tf, to other viewers
+                    yield "/backbone", _backbone(centre, turn, when)
         measured = self._measured(record.measurement)
         if measured is not None:
             yield "/tip/measured", _pose(*measured, when)
@@ -95,7 +97,9 @@ class ViewerTopics:
     def _frames(self, centre: Array, turn: Array, when: Timestamp) -> bytes:
         message = FrameTransforms()
         names = self._geometry.ring_names
-        for name, (x, y, z), (i, j, k, w) in zip(names, rounded(centre), rounded(turn), strict=True):
+        for name, (x, y, z), (i, j, k, w) in zip(
+            names, rounded(centre, _FRAME_GRID), rounded(turn, _FRAME_GRID), strict=True
+        ):
             frame = message.transforms.add(parent_frame_id=WORLD, child_frame_id=name, timestamp=when)
             frame.translation.x, frame.translation.y, frame.translation.z = x, y, z
             frame.rotation.x, frame.rotation.y, frame.rotation.z, frame.rotation.w = i, j, k, w
@@ -133,7 +137,7 @@ def _pose(position: Array, turn: Array, when: Timestamp) -> bytes:
 
 def _backbone(centre: Array, turn: Array, when: Timestamp) -> bytes:
     message = PosesInFrame(timestamp=when, frame_id=WORLD)
-    for position, rotation in zip(rounded(centre), rounded(turn), strict=True):
+    for position, rotation in zip(rounded(centre, _FRAME_GRID), rounded(turn, _FRAME_GRID), strict=True):
         _set_pose(message.poses.add(), position, rotation)
     return message.SerializeToString()
 

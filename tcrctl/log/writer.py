@@ -3,6 +3,10 @@
 control thread -- step(record) --> queue --> writer thread: encode, compress, flush --> file
 
 Only the writer thread touches the file once the constructor has returned.
+
+Two threads of a Python program hinder each other while both have something to do. A paced run has gaps between its
+steps, in which the log is written. A run that no clock paces has none; there they take turns: the steps wait in the
+queue until there are some dozens, then the control thread waits until all are written.
 """
 
 from __future__ import annotations
@@ -26,6 +30,7 @@ from tcrctl.signals import StepRecord
 
 _QUEUE_S: Final = 2.0  # a writer that lags further behind will not catch up: the disk is too slow
 _QUEUE_MIN_STEPS: Final = 1000
+_TURN_STEPS: Final = 64  # most steps of an unpaced run between two turns of the writer thread
 _POLL_S: Final = 1.0  # how often an idle writer looks whether the main thread still lives
 
 
@@ -39,8 +44,8 @@ class LogWriter:
 
     The file is created, and its attachments and start metadata written, before the constructor returns: a bad
     folder is found before the robot moves. From then on a writer thread owns the file. Whatever ends the
-    ``with`` body, the file gets a stop record; without one (kill -9, power cut) it is readable up to the last
-    flush.
+    ``with`` body, the file gets a stop record, even if the disk is full; without one (kill -9, power cut) it is
+    readable up to the last flush.
     """
 
     def __init__(
@@ -55,6 +60,7 @@ class LogWriter:
         flush_s: float = 0.5,
         flush_steps: int = 500,
         fsync: bool = False,
+        full_state_s: float = 0.0,
         wait_when_full: bool = False,
         opener: Callable[[Path], BinaryIO] = open_new,
     ) -> None:
@@ -67,11 +73,14 @@ class LogWriter:
             geometry: Names and topology of the robot.
             epoch_ns: Unix time of t = 0 [ns].
             period_s: Control period [s].
-            flush_s: A step is flushed at most this long after it was logged [s].
+            flush_s: A step is flushed at most this long after it was logged [s]; in a run that no clock paces, this
+                much of the run's own time counts if it takes longer.
             flush_steps: At most this many steps are unflushed.
             fsync: Also wait at every flush until the disk has it (survives a power cut).
-            wait_when_full: Let :meth:`step` wait while the queue is full, instead of failing; for runs that
-                no clock paces.
+            full_state_s: Time between two steps that are written in full [s]; 0: every step. See
+                :mod:`tcrctl.log.schema`.
+            wait_when_full: Let :meth:`step` wait for the writer thread from time to time, instead of failing when
+                it lags; for runs that no clock paces.
             opener: Opens the file.
 
         Raises:
@@ -80,10 +89,16 @@ class LogWriter:
         self.path = Path(path)
         self._flush_s, self._flush_steps, self._fsync = flush_s, flush_steps, fsync
         self._wait_when_full = wait_when_full
+        self._least, self._turn_steps = 1, 0
+        if wait_when_full:  # on a slow machine too a chunk shall be worth compressing
+            self._least = max(1, math.ceil(flush_s / period_s - 1e-9))
+            self._turn_steps = max(1, min(_TURN_STEPS, flush_steps // 2, self._least // 2))
         self._limit = max(_QUEUE_MIN_STEPS, math.ceil(_QUEUE_S / period_s))
         self._queue: SimpleQueue[StepRecord | Event | dict[str, str]] = SimpleQueue()
+        self._turn, self._written = threading.Event(), threading.Event()
+        self._in_turn = 0
         self._failure: Exception | None = None
-        self._finished = False
+        self._finished = self._reported = False
         self._stream = _create(self.path, opener)
         try:
             self._file = McapFile(
@@ -93,6 +108,7 @@ class LogWriter:
                 geometry=geometry,
                 epoch_ns=epoch_ns,
                 period_s=period_s,
+                full_state_s=full_state_s,
             )
         except Exception as error:
             with suppress(OSError):
@@ -109,9 +125,13 @@ class LogWriter:
             LogError: If the writer thread failed (disk full), is too slow, or the log is finished.
         """
         self._check()
-        if self._queue.qsize() >= self._limit:
-            self._overflow()
+        if self._queue.qsize() >= self._limit and not self._wait_when_full:
+            text = f"the disk is too slow: {self._limit} steps are waiting to be written"
+            raise LogError(self.path, text, hint="Log to a faster disk or lower the control rate.")
         self._queue.put(record)
+        self._in_turn += 1
+        if self._wait_when_full and self._in_turn >= self._turn_steps:
+            self._let_write()
 
     def event(self, t: float, kind: str, level: str, message: str) -> None:
         """Log an event at time ``t`` [s]; see :class:`tcrctl.log.event.Event`.
@@ -132,6 +152,7 @@ class LogWriter:
         self._check()
         self._finished = True
         self._queue.put(dict(stop))
+        self._turn.set()
         self._thread.join()
         if self._failure is not None:
             raise self._error(self._failure) from self._failure
@@ -143,8 +164,9 @@ class LogWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Finish the log if :meth:`finish` was not called, with status ``error`` or ``aborted``."""
-        if self._finished:
+        """Finish the log with status ``error`` or ``aborted``, if it was not finished and has not failed."""
+        if self._finished or self._reported:
+            self._thread.join()
             return
         if error is None:
             self.finish({"status": "error", "reason": "the run ended without a result"})
@@ -158,6 +180,7 @@ class LogWriter:
 
     def _check(self) -> None:
         if self._failure is not None:
+            self._reported = True
             raise self._error(self._failure) from self._failure
         if self._finished:
             raise LogError(self.path, "is finished; nothing can be added")
@@ -166,24 +189,36 @@ class LogWriter:
         hint = f"Everything up to the last flush is readable: tcrctl recover {self.path}"
         return LogError(self.path, f"writing failed: {failure}", hint=hint)
 
-    def _overflow(self) -> None:
-        while self._wait_when_full and self._queue.qsize() >= self._limit:
-            time.sleep(0.001)
-            self._check()
-        if not self._wait_when_full:
-            text = f"the disk is too slow: {self._limit} steps are waiting to be written"
-            raise LogError(self.path, text, hint="Log to a faster disk or lower the control rate.")
+    def _let_write(self) -> None:
+        """Give the writer thread its turn, and wait until it has written everything."""
+        self._in_turn = 0
+        self._written.clear()
+        self._turn.set()
+        while not self._written.wait(_POLL_S) and self._thread.is_alive():
+            pass
+        self._check()
 
     def _run(self) -> None:
         """Body of the writer thread."""
         try:
             self._write_until_stop()
         except Exception as failure:
+            self._end_after(failure)
             self._failure = failure
         try:
             self._stream.close()
         except OSError as failure:
             self._failure = self._failure or failure
+        self._written.set()
+
+    def _end_after(self, failure: Exception) -> None:
+        """Say in the file why it ends; what was flushed stays readable even if that fails too."""
+        stop = {"status": "error", "reason": f"writing failed: {failure}"}
+        with suppress(Exception):
+            if isinstance(failure, OSError):
+                self._file.cut_short(self.path, stop)
+            else:
+                self._file.finish(stop)
 
     def _write_until_stop(self) -> None:
         flush_at = math.inf
@@ -202,23 +237,30 @@ class LogWriter:
 
     def _next(self, flush_at: float) -> StepRecord | Event | dict[str, str] | None:
         """Next item; None if a flush is due or nothing came for a while."""
-        wait = min(_POLL_S, max(0.0, flush_at - time.monotonic()))
-        try:
-            return self._queue.get(timeout=wait) if wait > 0.0 else self._queue.get_nowait()
-        except Empty:
-            if not self._finished and not threading.main_thread().is_alive():
-                return {"status": "error", "reason": "the program ended without finishing the log"}
-            return None
+        with suppress(Empty):
+            return self._queue.get_nowait()
+        self._written.set()
+        if self._wait_when_full:  # what is logged outside a turn waits half a flush interval at most
+            self._turn.wait(min(_POLL_S, 0.5 * self._flush_s))
+            self._turn.clear()
+        else:
+            wait = max(0.0, min(_POLL_S, flush_at - time.monotonic()))
+            with suppress(Empty):
+                return self._queue.get(timeout=wait) if wait > 0.0 else None
+        if not self._finished and not threading.main_thread().is_alive():
+            return {"status": "error", "reason": "the program ended without finishing the log"}
+        return None
 
     def _flush_if_due(self, flush_at: float) -> float:
         """Flush if it is time to; return when the next flush is due on the monotonic clock [s]."""
         if self._file.unflushed == 0:
             return math.inf
-        now = time.monotonic()
-        if now >= flush_at or self._file.unflushed >= self._flush_steps:
+        now, waiting = time.monotonic(), self._file.unflushed
+        room = max(1, self._flush_steps - self._turn_steps)  # so many may wait for the next turn
+        if waiting >= room or (now >= flush_at and waiting >= self._least):
             self._file.flush(to_disk=self._fsync)
             return math.inf
-        return min(flush_at, now + self._flush_s)
+        return min(flush_at, now + (0.5 if self._wait_when_full else 1.0) * self._flush_s)
 
 
 def _create(path: Path, opener: Callable[[Path], BinaryIO]) -> BinaryIO:

@@ -11,6 +11,7 @@ from tcrctl.errors import DivergenceError
 from tcrctl.memory import ACCELERATION, POSITION, SPEED, Kept
 from tcrctl.plant.disturbances import pushed, seen
 from tcrctl.plant.settings import Mismatch, SimulatedSettings
+from tcrctl.plant.stroke import within_stroke
 from tcrctl.robot import dynamics, pose
 from tcrctl.robot.equations import make_workspace
 from tcrctl.robot.equilibrium import Equilibrium, equilibrium
@@ -92,16 +93,13 @@ class SimulatedPlant:
         Raises:
             DivergenceError: If a time step did not converge.
         """
-        low, high = self.robot.stroke
-        before = self._state.drive
-        drive = np.clip(before + self.period * command.speed, low, high)
-        applied = Command((drive - before) / self.period, drive)
+        applied = within_stroke(command, self._state.drive, self.period, self.robot.stroke)
         force = pushed(self.robot.weight, self._pushes, self.time)
         self._advance(applied.speed, self.period - self._late, force)
         self._seen.append(self._state.q.copy())
         self._advance(applied.speed, self._late, force)
         self.time += self.period
-        self._state.drive[:] = drive  # the sum of many sub-steps differs from it by rounding
+        self._state.drive[:] = applied.drive  # the sum of many sub-steps differs from it by rounding
         return applied
 
     def _advance(self, speed: Array, duration: float, force: Array) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from tcrctl.robot.model import FIXED
 from tcrctl.signals import Array
 
 
@@ -90,3 +91,17 @@ def output_matrix(q: Array, ring: int) -> Array:
             for a in range(3):
                 C[3 + a, column] = (change[a] - n[a] * along) / size
     return C
+
+
+@njit(cache=True, error_model="numpy")
+def drive_gain(q: Array, gain: Array, ring: int) -> Array:
+    """Derivatives (7, m) of position, normal and twist of a ring by the drives.
+
+    Args:
+        q: Node positions (3 n_nodes,) [m].
+        gain: Derivatives of the free coordinates by the drives (12 n_modules, m).
+        ring: Row of the ring's first node, not that of the base.
+    """
+    first = 3 * (ring - FIXED)
+    moved: Array = np.dot(output_matrix(q, ring), gain[first : first + 9])
+    return moved

@@ -1,0 +1,248 @@
+"""Replay of one log; see :mod:`tcrctl.replay`."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from tcrctl.controller.controller import Controller, build_controller
+from tcrctl.errors import StoppedError
+from tcrctl.estimator.estimator import build_estimator
+from tcrctl.experiment import Experiment
+from tcrctl.log.checksums import checksums
+from tcrctl.log.comparison import Comparison, quantities
+from tcrctl.log.reader import Log, read_log
+from tcrctl.loop import run_loop
+from tcrctl.pacing import Unpaced
+from tcrctl.plant.recorded import Limits, Recorded, RecordingEndedError
+from tcrctl.plant.stroke import within_stroke
+from tcrctl.replay.environment import Change, changes
+from tcrctl.replay.rebuild import Origin, rebuild
+from tcrctl.replay.replayed_log import open_replayed
+from tcrctl.replay.result import ALL_STEPS, EXACT, Replay, Tolerance, Window
+from tcrctl.robot.robot import Robot, build_robot
+from tcrctl.safety import SafetyLimits
+from tcrctl.signals import StepRecord
+from tcrctl.trajectory.start_blend import StartBlend
+from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
+
+Progress = Callable[[int, int | None], None]
+Announce = Callable[[Sequence[Change]], None]
+Watch = Callable[[StepRecord, StepRecord], None]
+
+#: What a plant of each kind makes of a command, where it depends on nothing but the measurement before.
+LIMITS: Final[Mapping[str, Callable[[Robot, float], Limits]]] = {
+    "simulated": lambda robot, period: (
+        lambda command, measured: within_stroke(command, measured.drive, period, robot.stroke)
+    ),
+}
+#: Parts of a step that are fed to the replay, or measured with a clock.
+GIVEN: Final = ("k", "measurement.", "truth.", "timing.")
+#: Steps that no log has: the recording itself ends the loop.
+_ENDLESS: Final = 2**40
+#: Stops nothing: a changed controller may fail where the recorded one did not, and the replay shall go on.
+NO_LIMITS: Final = SafetyLimits(np.inf, np.inf, 2**62)
+
+
+def _quiet(done: int, total: int | None) -> None:
+    """Show nothing."""
+
+
+def _silent(found: Sequence[Change]) -> None:
+    """Say nothing."""
+
+
+def replay(
+    path: str | os.PathLike[str],
+    *,
+    overrides: Sequence[str] = (),
+    window: Window = ALL_STEPS,
+    tolerance: Tolerance = EXACT,
+    out: Path | None = None,
+    watch: Watch | None = None,
+    announce: Announce = _silent,
+    progress: Progress = _quiet,
+) -> Replay:
+    """Rebuild estimator and controller from a log, feed them what was recorded, and compare what they do.
+
+    Args:
+        path: The log, finished or not.
+        overrides: Assignments ``a.b=c`` that change controller, estimator or safety limits.
+        window: Steps that are compared.
+        tolerance: By bytes if left out.
+        out: Log to be written with what was replayed.
+        watch: Takes every compared step, as recorded and as replayed.
+        announce: Takes what differs from the recording machine, before the first step.
+        progress: Takes the number of steps done, and their total if it is known.
+
+    Raises:
+        InputError: If the file is no log, or lacks something that the replay needs.
+        LogError: If it is damaged inside, or ``out`` cannot be written.
+    """
+    log = read_log(path)
+    environment = changes(log)
+    announce(environment)
+    origin = rebuild(log, overrides)
+    session = _Session(log, origin, window, tolerance, watch)
+    begin = time.perf_counter()
+    with ExitStack() as stack:
+        writer = None if out is None else stack.enter_context(open_replayed(out, log, origin, session.robot))
+        ended = session.run(None if writer is None else writer.step, progress)
+        result = session.result(ended, environment, time.perf_counter() - begin, out)
+        if writer is not None:
+            found = {"status": "success", "reason": "", "replay": json.dumps(result.as_json())}
+            writer.finish(found)
+    return result
+
+
+class _Session:
+    """One replay in progress."""
+
+    def __init__(
+        self, log: Log, origin: Origin, window: Window, tolerance: Tolerance, watch: Watch | None
+    ) -> None:
+        spec, self._watch = origin.wanted.spec, watch
+        self._log, self._origin, self._window = log, origin, window
+        self._kind, self._period = spec.plant.kind, float(spec.controller.period_s)
+        self.robot = build_robot(origin.wanted.robot)
+        limits = LIMITS[self._kind](self.robot, self._period) if self._kind in LIMITS else None
+        unknown = () if limits is not None else ("applied.",)
+        self._comparison = Comparison(quantities(*GIVEN, *unknown), tolerance.atol, tolerance.rtol)
+        self._steps, first = _peeked(log.steps())
+        self._plant = Recorded(self._steps, limits)
+        self._controller = build_controller(spec.controller, self.robot)
+        self._estimator = build_estimator(spec.estimator, self.robot, self._period, self._plant.state)
+        self._trajectory = self._references(first)
+        self._done = 0
+
+    def _references(self, first: StepRecord | None) -> Trajectory:
+        """Recorded references; those of the trajectory itself if the controller looks at other instants."""
+        recorded = self._origin.recorded.spec
+        if first is None or self._origin.wanted is self._origin.recorded:
+            return self._plant
+        if _same_instants(build_controller(recorded.controller, self.robot), self._controller):
+            return self._plant
+        trajectory = build_trajectory(recorded.trajectory, self.robot)
+        normal = self.robot.rest_normal if first.reference.normal is None else first.reference.normal
+        return StartBlend(trajectory, first.reference.position, normal, recorded.start.blend_s)
+
+    def run(
+        self, record: Callable[[StepRecord], None] | None, progress: Progress
+    ) -> RecordingEndedError | str:
+        """Replay to the end of the window or of what there is; return why it ended."""
+        experiment = Experiment(self._origin.wanted, self._origin.wanted.spec, self.robot, self._trajectory)
+        total = _total(self._log, self._window)
+
+        def take(step: StepRecord) -> None:
+            recorded, limited = self._plant.step, self._plant.limited
+            replayed = step if limited is None else replace(step, applied=limited)
+            # of the recorded input, which may differ from what it was when it was logged
+            fed = replace(replayed, measurement=recorded.measurement, reference=recorded.reference)
+            replayed = replace(replayed, checksums=checksums(fed))
+            self._done += 1
+            if step.k in self._window:
+                self._comparison.add(recorded, replayed)
+                if self._watch is not None:
+                    self._watch(recorded, replayed)
+                if record is not None:
+                    record(replayed)
+            progress(self._done, total)
+            if step.k == self._window.last:
+                raise _WindowEnd
+
+        try:
+            run_loop(
+                self._trajectory,
+                self._estimator,
+                self._controller,
+                self._plant,
+                take,
+                period=self._period,
+                duration=_ENDLESS * self._period,
+                pace=Unpaced(),
+                limits=experiment.safety if self._origin.wanted is self._origin.recorded else NO_LIMITS,
+            )
+        except _WindowEnd:
+            return ""
+        except RecordingEndedError as error:
+            return error
+        except StoppedError as error:
+            return "" if next(self._steps, None) is None else str(error)
+        raise AssertionError("a recording has an end")
+
+    def result(
+        self,
+        ended: RecordingEndedError | str,
+        environment: tuple[Change, ...],
+        seconds: float,
+        out: Path | None,
+    ) -> Replay:
+        """What was found, given why the replay ended."""
+        found = self._comparison
+        gap = isinstance(ended, RecordingEndedError) and ended.found is not None
+        stopped = ended if isinstance(ended, str) else ""
+        reason = ""
+        if found.first is not None:
+            reason = str(found.first)
+        elif stopped:
+            reason = f"the replay was stopped, the recorded run went on: {stopped}"
+        elif gap:
+            reason = f"{ended}; what comes after a gap cannot be replayed"
+        elif not self._log.complete and self._window.last is None:
+            reason = "the log is unfinished: the end of the run is missing"
+        elif not found.steps:
+            reason = "no step was compared"
+        status = (
+            "different" if found.first is not None or stopped else "incomplete" if reason else "identical"
+        )
+        return Replay(
+            log=self._log.path,
+            status=status,
+            reason=reason,
+            steps=self._done,
+            compared=found.steps,
+            different=found.different,
+            whole=not (gap or stopped) and found.steps > 0,
+            first_difference=found.first,
+            deviations=tuple(found.deviations.values()),
+            environment=environment,
+            not_compared=self._not_compared(),
+            duration_s=self._done * self._period,
+            seconds=seconds,
+            out=out,
+        )
+
+    def _not_compared(self) -> tuple[str, ...]:
+        if self._kind in LIMITS:
+            return ()
+        return (f"applied: the limits of plant.kind: {self._kind} are not known here",)
+
+
+class _WindowEnd(Exception):  # noqa: N818  (it ends the loop, nothing is wrong)
+    """The last step that is wanted has been replayed."""
+
+
+def _peeked(steps: Iterator[StepRecord]) -> tuple[Iterator[StepRecord], StepRecord | None]:
+    first = next(steps, None)
+    return (steps, None) if first is None else (itertools.chain([first], steps), first)
+
+
+def _same_instants(one: Controller, other: Controller) -> bool:
+    return np.array_equal(one.ahead, other.ahead)
+
+
+def _total(log: Log, window: Window) -> int | None:
+    """Steps to be replayed, if the log says how many it has."""
+    written = (log.stop or {}).get("steps", "")
+    if not written.isdecimal():
+        return None
+    return int(written) if window.last is None else min(int(written), window.last + 1)
