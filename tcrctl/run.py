@@ -9,6 +9,7 @@ import json
 import math
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -24,7 +25,10 @@ from tcrctl.log.writer import LogWriter
 from tcrctl.loop import run_loop
 from tcrctl.metrics import Metrics
 from tcrctl.pacing import Pace, RealTime, Unpaced
+from tcrctl.plant.journal import Journal
+from tcrctl.plant.session import Session
 from tcrctl.provenance import attachments, resolved_text, start_metadata
+from tcrctl.quiet import quiet_interpreter
 from tcrctl.robot.model import FIXED, RIGID_BARS, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.run_folder import LOG, RESOLVED, SPEC, SUMMARY, RunFolder, check_writable, make_run_folder
@@ -48,6 +52,7 @@ def run_experiment(
     *,
     out: Path,
     realtime: bool = False,
+    confirmed: bool = False,
     notify: Notify = silent,
     progress: Progress = _no_progress,
     tap: Tap | None = None,
@@ -59,7 +64,8 @@ def run_experiment(
     Args:
         experiment: What :func:`tcrctl.experiment.prepare` made.
         out: Where the run's folder is made.
-        realtime: Pace a simulated plant by the clock.
+        realtime: Pace a simulated plant by the clock; a rig is always paced.
+        confirmed: The operator has agreed that the rig moves; without it a rig is measured, not armed.
         notify: Takes messages for the user.
         progress: Takes the number of steps done and their total, after every step.
         tap: Takes every message of the log, in the log's thread; see :class:`tcrctl.view.live.LiveView`.
@@ -71,13 +77,16 @@ def run_experiment(
         DeviceError: If the run cannot be recorded or the plant not be reached; no folder is left behind.
     """
     check_writable(out)
+    realtime = realtime or experiment.paced
     with Interruption() as interruption:
         pace = RealTime(experiment.period, interruption.check) if realtime else Unpaced(interruption.check)
-        plant, state = build_plant(experiment)
+        journal = Journal(pace.time, notify)
+        plant, state = build_plant(experiment, Session(pace.time, journal.report, confirmed))
         try:
             parts = build_parts(experiment, plant, state)
             folder = make_run_folder(out, experiment.spec.name)
             log = _open_log(experiment, folder, realtime=realtime, tap=tap)
+            journal.attach(log.event)
         except BaseException:
             plant.close()
             raise
@@ -167,17 +176,19 @@ def _drive(
     failure: TcrctlError | None = None
     try:
         log.event(0.0, "start", *_start_message(parts.start_offset))
-        run_loop(
-            parts.trajectory,
-            parts.estimator,
-            parts.controller,
-            parts.plant,
-            record,
-            period=experiment.period,
-            duration=parts.trajectory.duration,
-            pace=pace,
-            limits=experiment.safety,
-        )
+        with _pace_kept(experiment, pace, log):
+            parts.plant.start()
+            run_loop(
+                parts.trajectory,
+                parts.estimator,
+                parts.controller,
+                parts.plant,
+                record,
+                period=experiment.period,
+                duration=parts.trajectory.duration,
+                pace=pace,
+                limits=experiment.safety,
+            )
     except TcrctlError as error:
         failure = error
     finally:
@@ -186,6 +197,15 @@ def _drive(
         except TcrctlError as error:  # what ended the run first is the reason
             failure = failure or error
     return failure
+
+
+def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractContextManager[None]:
+    """A quiet interpreter for runs that the clock paces."""
+    if not isinstance(pace, RealTime):
+        return nullcontext()
+    rig = experiment.loaded.rig
+    priority = None if rig is None else rig.rig.fifo_priority
+    return quiet_interpreter(priority, lambda text: log.event(0.0, "start", "warning", text))
 
 
 def _start_message(offset: float) -> tuple[str, str]:

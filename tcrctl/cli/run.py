@@ -37,6 +37,7 @@ ViewHost = Annotated[
 ViewPort = Annotated[
     int, typer.Option("--view-port", metavar="N", min=0, max=65535, help="Port of it; 0 takes a free one.")
 ]
+Yes = Annotated[bool, typer.Option("--yes", help="A rig: the drives may be armed and move; nobody is asked.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
@@ -51,6 +52,7 @@ def run(
     view: View = False,
     view_host: ViewHost = "127.0.0.1",
     view_port: ViewPort = 8765,
+    yes: Yes = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
@@ -65,7 +67,9 @@ def run(
       tcrctl run my_experiment.yaml --dry-run
       tcrctl run letter_t --realtime --view
       tcrctl run letter_t --json --out /data/runs | jq .position_error_mm.max
+      tcrctl run letter_t --set plant.kind=rig --set plant.rig=loopback   (see: tcrctl emulate --help)
     """
+    from tcrctl.cli.consent import ask, check_can_ask
     from tcrctl.interruption import signals_exit
     from tcrctl.spec import load_spec
 
@@ -73,8 +77,12 @@ def run(
     with ExitStack() as viewing:
         with signals_exit():
             loaded = load_spec(spec, overrides or ())
+            for note in loaded.notes:
+                say(f"note: {note}")
             say(_headline(loaded))
             if not dry_run:
+                if loaded.rig is not None and not yes:
+                    check_can_ask()
                 _get_ready(out)
             served = _live_view(loaded, view_host, view_port, say) if view and not dry_run else nullcontext()
             tap = viewing.enter_context(served)
@@ -85,6 +93,8 @@ def run(
         if dry_run:
             print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
             return
+        if loaded.rig is not None and not yes:
+            ask(f"{loaded.robot.name} on rig {loaded.rig.rig.name} will move for {_length(experiment)}.")
         summary = _run(experiment, out, realtime, say, tap, quiet=quiet)
     if summary.reason:
         print(f"{'error' if summary.exit_code != 3 else summary.status}: {summary.reason}", file=sys.stderr)
@@ -122,7 +132,13 @@ def _run(
     from tcrctl.run import run_experiment
 
     with progress_bar(experiment.spec.name, shown=not quiet) as progress:
-        return run_experiment(experiment, out=out, realtime=realtime, notify=say, progress=progress, tap=tap)
+        return run_experiment(
+            experiment, out=out, realtime=realtime, confirmed=True, notify=say, progress=progress, tap=tap
+        )
+
+
+def _length(experiment: Experiment) -> str:
+    return f"{experiment.steps * experiment.period:.0f} s"
 
 
 def _planned(experiment: Experiment, force: bool, say: Notify) -> StaticPath | None:
