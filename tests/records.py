@@ -42,7 +42,9 @@ def geometry(n_modules: int = 3, n_cables: int = 3) -> LogGeometry:
         for j in range(n_cables)
     )
     markers = tuple(4 * i + j for i in range(1, n_modules + 1) for j in range(3))
-    return LogGeometry(n_modules, routes, markers, tip_ring=n_modules)
+    springs = np.array([[4 * i + 3, 4 * (i + 1) + j] for i in range(n_modules) for j in range(3)])
+    path = np.stack([np.linspace(0.0, 0.1, 20), np.zeros(20), np.full(20, -0.6)], axis=1)
+    return LogGeometry(n_modules, routes, markers, tip_ring=n_modules, springs=springs, reference_path=path)
 
 
 def shape(t: float, n_modules: int, rng: np.random.Generator) -> np.ndarray:

@@ -20,6 +20,7 @@ from tcrctl.log.columns import COLUMNS, stack
 from tcrctl.log.reader import read_log
 from tcrctl.log.schema import descriptor_set, public_descriptor
 from tcrctl.log.steps import StepDecoder, StepEncoder
+from tcrctl.log.viewer_topics import TOPICS
 from tcrctl.signals import RawFrame
 
 
@@ -151,7 +152,7 @@ def test_every_unit_of_the_step_is_in_the_channel_metadata(finished):
     for column in COLUMNS.values():
         assert step.metadata.get(f"unit.{column.path}", "") == column.unit
     derived = {channel.topic for channel in channels if channel.metadata.get("derived") == "true"}
-    assert derived == {"/log", "/tf", "/tip/measured", "/tip/reference", "/backbone", "/scene"}
+    assert derived == {"/log", *TOPICS}
 
 
 def test_an_independent_checker_finds_no_fault(finished, tmp_path):

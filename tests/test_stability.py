@@ -120,6 +120,19 @@ def test_a_loop_that_is_given_the_memory_of_another_goes_on_like_it(tcr600, kind
     assert np.linalg.norm(one - other) < 2e-3 * np.linalg.norm(before - other)
 
 
+def test_a_copied_loop_is_whole(tcr5x4):
+    """The exact estimator of a copy looks at the plant of the copy."""
+    loop, reference = real_loop(tcr5x4, settings_of("kinematic"), 3, exact=True)
+    step = StepMap(loop, reference)
+    moved = copy.deepcopy(loop)
+    moved.plant.memory()["q"].values[...] += 1e-3
+    assert moved.estimator.update(moved.plant.read(), None).q[20] == moved.plant.state()[0][20]
+    before = loop.plant.state()[0]
+    assert moved.plant.state()[0][20] == pytest.approx(before[20] + 1e-3)
+    assert np.array_equal(step(np.zeros(step.size)), step(np.zeros(step.size)))
+    assert np.array_equal(loop.plant.state()[0], before)
+
+
 @pytest.mark.parametrize(("gain", "unstable", "push"), [(0.3, False, 1e-3), (2.0, True, 1e-6)])
 def test_a_small_push_grows_or_fades_as_the_radius_says(tcr5x4, gain, unstable, push):
     settings = settings_of("kinematic", gain_1_s=gain)

@@ -19,8 +19,11 @@ from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.paper import paper
+from tcrctl.cli.play import play
+from tcrctl.cli.plot import plot
 from tcrctl.cli.recover import recover
 from tcrctl.cli.replay import replay
+from tcrctl.cli.report import report
 from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
@@ -44,6 +47,9 @@ VERBS: dict[str, Callable[..., None]] = {
     "paper": paper,
     "replay": replay,
     "diff": diff,
+    "play": play,
+    "plot": plot,
+    "report": report,
 }
 
 

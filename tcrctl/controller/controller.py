@@ -29,6 +29,10 @@ class Controller(Protocol):
         """Command for the coming period, within speed and stroke limits, and how it was found."""
         ...
 
+    def sharpen(self) -> None:
+        """From now on solve to rounding: what a tick tolerates is a step in the map that is to be linearised."""
+        ...
+
     def memory(self) -> Mapping[str, Kept]:
         """What the next command depends on; see :class:`tcrctl.memory.Remembers`."""
         ...

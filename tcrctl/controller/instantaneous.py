@@ -56,6 +56,10 @@ class InstantaneousOptimalControl:
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
         self.ahead = self._predictor.ahead
 
+    def sharpen(self) -> None:
+        """Let the predictor solve to rounding."""
+        self._predictor.sharpen()
+
     def memory(self) -> Mapping[str, Kept]:
         """Last input, integral action, and what the predictor keeps."""
         return {

@@ -4,9 +4,8 @@
     u = J⁺ (dy_d/dt + k (y_d + shift - y)) + Z z
 
 J⁺ is the damped pseudo-inverse [NH86], positions in m and normals times a lever. Z spans the drives that leave the
-end where it is; z moves the model's tensions towards a reference. There is no horizon, no cost and no inertia: a
-slow mode of damping ζ and frequency ω, which the map does not know, bounds the gain k by about 2 ζ ω, some tenths
-of 1/s.
+end where it is; z moves the model's tensions towards a reference. There is no horizon, no cost and no inertia: the
+lightly damped slow modes, which the map does not know, bound the gain k at about 1 1/s.
 """
 
 from __future__ import annotations
@@ -18,11 +17,12 @@ import numpy as np
 from tcrctl.controller.cost import input_limits, pose_error
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.integral import IntegralAction
-from tcrctl.controller.multi_step import follow
+from tcrctl.controller.multi_step import TOLERANCE, follow
 from tcrctl.controller.settings import KinematicSettings, SlackGuard
 from tcrctl.controller.static import rest_map, static_outputs
 from tcrctl.memory import Kept
 from tcrctl.robot.equations import make_workspace
+from tcrctl.robot.equilibrium import TOLERANCE as SHARP
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.potential import Outcome
 from tcrctl.robot.response import POSE_ROWS
@@ -78,10 +78,14 @@ class Kinematic:
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
         self._at = rest_map(robot)
         self._integral = IntegralAction(settings.integral, settings.period_s)
-        self._solved = False
+        self._solved, self._tolerance = False, TOLERANCE
         self._normal = robot.rest_normal if settings.output == "pose" else None
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
         self.ahead = np.array([settings.period_s])
+
+    def sharpen(self) -> None:
+        """See :class:`tcrctl.controller.controller.Controller`."""
+        self._tolerance = SHARP
 
     def memory(self) -> Mapping[str, Kept]:
         """Integral action."""
@@ -102,7 +106,7 @@ class Kinematic:
         tension, gain = estimate.tension, np.zeros((POSE_ROWS + robot.n_cables, robot.n_cables))
         if estimate.converged and np.isfinite(estimate.q).all():
             at = self._at
-            good = Outcome(*follow(robot.model, self._load, self._work, *at, estimate.drive))
+            good = Outcome(*follow(robot.model, self._load, self._work, *at, estimate.drive, self._tolerance))
             reason = "" if good.converged else "the model has no stable equilibrium at the present drives"
         self._solved = good.converged
         if not reason:

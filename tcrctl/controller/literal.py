@@ -116,6 +116,9 @@ class LiteralIoc:
         solution = Solution(*solve_ioc(problem, prediction, self._weights))
         return step + h * (self._gain @ (solution.inputs - speed)), solution
 
+    def sharpen(self) -> None:
+        """Nothing to do: (41) always ends with a whole Newton step."""
+
     def memory(self) -> Mapping[str, Kept]:
         """Last input and integral action."""
         return {"speed": Kept(self._speed, SPEED), **self._integral.memory(self._normal)}

@@ -27,6 +27,7 @@ from tcrctl.controller.settings import IocSettings
 from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, pose, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
+from tcrctl.robot.equilibrium import TOLERANCE as SHARP
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.model import FIXED, Model
 from tcrctl.robot.potential import Outcome, minimise
@@ -60,7 +61,14 @@ class Memory(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def follow(
-    model: Model, load: Load, ws: Workspace, equilibrium: Array, drive: Array, gain: Array, wanted: Array
+    model: Model,
+    load: Load,
+    ws: Workspace,
+    equilibrium: Array,
+    drive: Array,
+    gain: Array,
+    wanted: Array,
+    tolerance: float,
 ) -> Outcome:
     """Move the model's equilibrium to other drives, starting where its static gain points to.
 
@@ -72,12 +80,13 @@ def follow(
         drive: Drives it belongs to (m,) [m], moved.
         gain: ∂q_eq/∂d (12 n_modules, m) with the taut cables, moved.
         wanted: The new drives (m,) [m].
+        tolerance: Largest nodal force accepted [N].
     """
     q = equilibrium.copy()
     for k in range(gain.shape[0]):
         for c in range(drive.shape[0]):
             q[3 * FIXED + k] += gain[k, c] * (wanted[c] - drive[c])
-    outcome = minimise(model, q, wanted, load, ws, TOLERANCE, int(MAX_ITERATIONS), bool(1))
+    outcome = minimise(model, q, wanted, load, ws, tolerance, int(MAX_ITERATIONS), bool(1))
     if outcome.converged:
         equilibrium[:], drive[:] = q, wanted
         linear.couple(ws, ws.r)
@@ -117,6 +126,7 @@ def forecast(
     edges: Array,
     tip: int,
     now: Array,
+    tolerance: float,
 ) -> tuple[Outcome, bool, Array, Array]:
     """One prediction as in the module's docstring, in one kernel.
 
@@ -134,11 +144,12 @@ def forecast(
         edges: Instants at which input blocks begin, and the end (blocks + 1,).
         tip: Row of the first node of the tip ring.
         now: Outputs now (7 + m,).
+        tolerance: Largest nodal force left in the equilibrium [N].
 
     Returns:
         Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m).
     """  # fmt: skip
-    outcome = follow(model, load, ws, memory.equilibrium, memory.drive, memory.gain, drive)
+    outcome = follow(model, load, ws, memory.equilibrium, memory.drive, memory.gain, drive, tolerance)
     deviation, away, finite = np.empty(q.shape[0]), np.empty(q.shape[0]), True
     for k in range(q.shape[0]):
         deviation[k] = q[k] - memory.equilibrium[k]
@@ -185,11 +196,15 @@ class MultiStep:
             MAX_ITERATIONS,
             True,
         )
-        self._solved = False
+        self._solved, self._tolerance = False, TOLERANCE
         basis = response.start_basis(robot.model, self._work, settings.modes)
         self._memory = Memory(
             rest.copy(), np.zeros(robot.n_cables), robot.rest.gain.copy(), still, still.copy(), basis
         )
+
+    def sharpen(self) -> None:
+        """See :class:`Predictor`."""
+        self._tolerance = SHARP
 
     def memory(self) -> Mapping[str, Kept]:
         """Offset and last velocities without the fixed base, if the offset moves.
@@ -216,7 +231,7 @@ class MultiStep:
         outcome, stable, free, gain = forecast(
             self._robot.model, self._load, self._work, self._memory, estimate.q + age * estimate.v, estimate.v,
             estimate.drive, self._period, self._blend, self.ahead, self.edges, self._robot.tip,
-            now,
+            now, self._tolerance,
         )  # fmt: skip
         outcome = Outcome(*outcome)
         good = outcome.converged and stable

@@ -24,6 +24,8 @@ from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Estimate
 
 TOLERANCE = 1e-5
+#: Where the tolerance itself must not show.
+SHARP = 1e-7
 MAX_ITERATIONS = 60
 
 
@@ -37,8 +39,13 @@ class OneStep:
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._gain = np.zeros((self._work.r.shape[0], robot.n_cables))
         self._column = np.zeros(self._work.r.shape[0])
+        self._tolerance = TOLERANCE
         self._last: tuple[Load, Array] | None = None
         self._guess = robot.rest.q.copy()
+
+    def sharpen(self) -> None:
+        """See :class:`Predictor`."""
+        self._tolerance = SHARP
 
     def memory(self) -> Mapping[str, Kept]:
         """Nothing: the guess is where the iteration starts, not where it ends."""
@@ -66,7 +73,7 @@ class OneStep:
         q = self._guess.copy()
         drive = estimate.drive + h * speed
         outcome = Outcome(
-            *minimise(self._robot.model, q, drive, load, self._work, TOLERANCE, MAX_ITERATIONS, True)
+            *minimise(self._robot.model, q, drive, load, self._work, self._tolerance, MAX_ITERATIONS, True)
         )
         self._last = (load, drive) if outcome.converged else None
         if outcome.converged:

@@ -27,6 +27,9 @@ class OpenLoop:
         self._stroke = robot.stroke
         self.ahead = np.array([settings.period_s])
 
+    def sharpen(self) -> None:
+        """Nothing is solved."""
+
     def memory(self) -> Mapping[str, Kept]:
         """Nothing is remembered."""
         return {}

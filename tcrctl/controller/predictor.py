@@ -57,6 +57,10 @@ class Predictor(Protocol):
         """
         ...
 
+    def sharpen(self) -> None:
+        """From now on solve to rounding: what a tick tolerates is a step in the map that is to be linearised."""
+        ...
+
     def memory(self) -> Mapping[str, Kept]:
         """What the next prediction depends on; see :class:`tcrctl.memory.Remembers`."""
         ...

@@ -20,13 +20,14 @@ from numba import njit
 from tcrctl.controller.blocks import block_edges, superpose
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
-from tcrctl.controller.multi_step import follow
+from tcrctl.controller.multi_step import TOLERANCE, follow
 from tcrctl.controller.predictor import Forecast
 from tcrctl.controller.settings import IocSettings
 from tcrctl.elements.sliding_cable import STIFFNESS
 from tcrctl.memory import NORMAL, POSITION, TENSION, Kept
 from tcrctl.robot import linear, pose
 from tcrctl.robot.equations import Load, Workspace, make_workspace
+from tcrctl.robot.equilibrium import TOLERANCE as SHARP
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.model import FIXED, Model
 from tcrctl.robot.potential import Outcome
@@ -95,6 +96,7 @@ def forecast(
     edges: Array,
     tip: int,
     now: Array,
+    tolerance: float,
 ) -> tuple[Outcome, Array, Array]:
     """One prediction as in the module's docstring, in one kernel.
 
@@ -110,11 +112,12 @@ def forecast(
         edges: Instants at which input blocks begin, and the end (blocks + 1,).
         tip: Row of the first node of the tip ring.
         now: Outputs now (7 + m,).
+        tolerance: Largest nodal force left in the equilibrium [N].
 
     Returns:
         Outcome of the statics, free (n, 7 + m), gain (n, 7 + m, blocks * m).
     """
-    outcome = follow(model, load, ws, at.equilibrium, at.drive, at.gain, drive)
+    outcome = follow(model, load, ws, at.equilibrium, at.drive, at.gain, drive, tolerance)
     rest, answer = static_outputs(model, ws, at, tip)
     if outcome.converged and blend > 0.0 and np.isfinite(now).all():
         offset += blend * (now - rest - offset)
@@ -136,8 +139,12 @@ class Static:
         offset = settings.offset
         self._blend = 0.0 if offset is None else -float(np.expm1(-settings.period_s / offset.filter_s))
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
-        self._solved = False
+        self._solved, self._tolerance = False, TOLERANCE
         self._at, self._offset = rest_map(robot), np.zeros(POSE_ROWS + robot.n_cables)
+
+    def sharpen(self) -> None:
+        """See :class:`Predictor`."""
+        self._tolerance = SHARP
 
     def memory(self) -> Mapping[str, Kept]:
         """Offset of position, normal, twist and tensions, if it moves."""
@@ -157,7 +164,7 @@ class Static:
         del age, speed  # at rest the past does not matter
         outcome, free, gain = forecast(
             self._robot.model, self._load, self._work, self._at, self._offset, estimate.drive, self._blend,
-            self.ahead, self.edges, self._robot.tip, now,
+            self.ahead, self.edges, self._robot.tip, now, self._tolerance,
         )  # fmt: skip
         outcome = Outcome(*outcome)
         reason = "" if outcome.converged else "the model has no stable equilibrium at the present drives"

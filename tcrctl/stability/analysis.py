@@ -28,8 +28,9 @@ from tcrctl.stability.closed_loop import ClosedLoop, StepMap
 from tcrctl.stability.report import StabilityPoint, StabilityReport
 from tcrctl.trajectory.trajectory import sample_reference
 
-#: Length of a deviation of the loop's state, in the scales of its parts: micrometres per coordinate.
-STEP: Final = 0.03
+#: Length of a deviation of the loop's state, in the scales of its parts: some micrometres per coordinate, so that
+#: what the solvers of plant and estimator tolerate does not show.
+STEP: Final = 0.2
 #: The same for the inner iteration: nanometres, as rods bent by more change the robot's soft directions.
 INNER_STEP: Final = 1e-4
 #: Eigenvalues kept per point.
@@ -80,10 +81,12 @@ def analyse(
         plant.close()
         raise InputError("the stability analysis needs plant.kind: simulated; a robot cannot be copied")
     plant.without_noise()
-    probe = _Probe(experiment, build_parts(experiment, plant, state), plant, points, every, progress)
+    parts = build_parts(experiment, plant, state)
+    parts.controller.sharpen()
+    probe = _Probe(experiment, parts, plant, points, every, progress)
     stopped = ""
     with Interruption() as interruption:
-        parts, pace = probe.parts, Unpaced(interruption.check)
+        pace = Unpaced(interruption.check)
         try:
             run_loop(
                 parts.trajectory,

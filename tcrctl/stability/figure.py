@@ -37,8 +37,10 @@ def draw(report: StabilityReport, out: Path) -> None:
     inner.set_ylabel("max |μ| of (42),\ninner iteration")
     inner.set_xlabel("t [s]")
     for axes in (outer, inner):
-        for moment in t[columns["limited"] > 0.0]:
-            axes.axvline(moment, color="C3", alpha=0.15, linewidth=3.0)
+        for i, moment in enumerate(t[columns["limited"] > 0.0]):
+            axes.axvline(moment, color="C3", alpha=0.15, linewidth=3.0, label="" if i else "a limit acts")
+    if columns["limited"].any():
+        outer.legend(loc="best", fontsize="small")
     try:
         figure.savefig(out, dpi=160)
     except OSError as error:
