@@ -102,7 +102,10 @@ def test_an_override_takes_part_in_every_check_and_is_remembered(tmp_path: Path)
             ["controller.tension=no"],
             '--set controller.tension: must be off or a map of keys and values, not "no"',
         ),
-        (["controller.kind=open_lop"], "--set controller.kind: must be one of 'ioc', 'kinematic', 'open_loop'"),
+        (
+            ["controller.kind=open_lop"],
+            "--set controller.kind: must be one of 'ioc', 'kinematic', 'open_loop'",
+        ),
         (["estimator.kind=exakt"], "--set estimator.kind: must be one of 'passive_observer', 'exact'"),
         (["estimator.kind=exakt"], "did you mean exact?"),
         (
