@@ -139,8 +139,7 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
     spec = loaded.spec.model_copy(update=changes)
     with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
         robot = build_robot(loaded.robot)
-        targets = task_targets(spec.task, spec.seed) if spec.task else {}
-        trajectory = build_trajectory(spec.trajectory, robot, targets)
+        trajectory = make_trajectory(spec, robot)
         tracks = None if isinstance(spec.controller, OpenLoopSettings) else spec.controller.output
         if tracks == "pose" and trajectory.normal(np.zeros(1)) is None:
             raise InputError(
@@ -150,6 +149,16 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
         experiment = Experiment(loaded, spec, robot, trajectory)
         _rehearse(experiment)
     return experiment
+
+
+def make_trajectory(spec: ExperimentSpec, robot: Robot) -> Trajectory:
+    """Build the trajectory of an experiment, to the targets of its task if it has one.
+
+    Raises:
+        NoEquilibriumError: If drive lengths are given with which the robot has no stable shape.
+    """
+    targets = task_targets(spec.task, spec.seed) if spec.task else {}
+    return build_trajectory(spec.trajectory, robot, targets)
 
 
 def plan(experiment: Experiment) -> StaticPath:

@@ -17,7 +17,7 @@ import numpy as np
 from tcrctl.controller.controller import Controller, build_controller
 from tcrctl.errors import StoppedError
 from tcrctl.estimator.estimator import build_estimator
-from tcrctl.experiment import Experiment
+from tcrctl.experiment import Experiment, make_trajectory
 from tcrctl.log.checksums import checksums
 from tcrctl.log.comparison import Comparison, quantities
 from tcrctl.log.reader import Log, read_log
@@ -33,7 +33,7 @@ from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.safety import SafetyLimits
 from tcrctl.signals import StepRecord
 from tcrctl.trajectory.start_blend import StartBlend
-from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
+from tcrctl.trajectory.trajectory import Trajectory
 
 Progress = Callable[[int, int | None], None]
 Announce = Callable[[Sequence[Change]], None]
@@ -131,7 +131,7 @@ class _Session:
             return self._plant
         if _same_instants(build_controller(recorded.controller, self.robot), self._controller):
             return self._plant
-        trajectory = build_trajectory(recorded.trajectory, self.robot)
+        trajectory = make_trajectory(recorded, self.robot)
         normal = self.robot.rest_normal if first.reference.normal is None else first.reference.normal
         return StartBlend(trajectory, first.reference.position, normal, recorded.start.blend_s)
 

@@ -1,0 +1,20 @@
+"""Logs of experiments with a task are replayed, also with other prediction instants."""
+
+from __future__ import annotations
+
+import json
+
+from test_task_specs import BELOW
+
+from tcrctl.cli.app import main
+from tcrctl.experiment import prepare
+from tcrctl.run import run_experiment
+from tcrctl.spec import load_spec
+
+
+def test_what_if_on_a_log_whose_trajectory_goes_to_a_target(tmp_path, capsys):
+    summary = run_experiment(prepare(load_spec("laser_pipe", BELOW)), out=tmp_path)
+    assert main(["replay", str(summary.log), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["status"] == "identical"
+    assert main(["replay", str(summary.log), "--json", "--set", "controller.horizon_s=1.0"]) == 3
+    assert json.loads(capsys.readouterr().out)["status"] == "different"
