@@ -52,7 +52,7 @@ def find_experiment(name_or_path: str) -> Path:
         UnknownNameError: If there is no shipped experiment of that name.
         InputError: If the path leads to no file.
     """
-    if name_or_path in identifications():
+    if is_identification(name_or_path):
         raise InputError(
             f"{name_or_path} is an identification, not an experiment",
             hint=f"Start it with: tcrctl identify {name_or_path}",
@@ -101,6 +101,19 @@ def find_rig(name_or_path: str, folder: Path | None = None) -> Path:
     if folder is not None and is_path(name_or_path) and (folder / Path(name_or_path).expanduser()).is_file():
         return folder / Path(name_or_path).expanduser()
     return _find("rig", name_or_path, rigs(), Path())
+
+
+def is_identification(name_or_path: str) -> bool:
+    """Whether a shipped name or a file is an identification; False if there is none or it cannot be read."""
+    from tcrctl import strict_yaml
+
+    if not is_path(name_or_path):
+        return name_or_path in identifications()
+    try:
+        data = strict_yaml.load(Path(name_or_path).expanduser()).data
+    except InputError:
+        return False
+    return isinstance(data, dict) and data.get("kind") == "identification"
 
 
 def is_path(name_or_path: str) -> bool:

@@ -59,19 +59,18 @@ def _usual(loaded: LoadedIdentification, recordings: Sequence[Recording]) -> str
 
 def _lengths(robot: RobotDescription, recordings: Sequence[Recording]) -> Array:
     """Rest lengths of the logged robots, or else of the robot as given (m,) [m]."""
-    known = [r for r in recordings if r.rest_length is not None]
+    known = [(r.name, r.rest_length) for r in recordings if r.rest_length is not None]
     if not known:
         rest: Array = build_robot(robot).model.cables[:, sliding_cable.REST]
         return rest
-    first = known[0]
-    for other in known[1:]:
-        if np.abs(other.rest_length / first.rest_length - 1.0).max() > SAME_LENGTH:
+    name, first = known[0]
+    for other, length in known[1:]:
+        if np.abs(length / first - 1.0).max() > SAME_LENGTH:
             raise InputError(
-                f"{first.name} and {other.name} have cables of different rest lengths",
+                f"{name} and {other} have cables of different rest lengths",
                 hint="Identify from one of them at a time, or use strung_by: tension.",
             )
-    assert first.rest_length is not None
-    return first.rest_length
+    return first
 
 
 def with_lengths(robot: RobotDescription, rest: Array) -> RobotDescription:

@@ -60,7 +60,8 @@ class Frame:
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         if self.mirrored:
             turn[:, 1] *= -1.0
-        return model @ turn.T
+        out: Array = model @ turn.T
+        return out
 
     def place(self, model: Array) -> Array:
         """Positions (n, 3) [m] of the robot's frame in the measurement's frame."""

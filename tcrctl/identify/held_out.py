@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tcrctl.errors import NoEquilibriumError
 from tcrctl.identify.best import Best
 from tcrctl.identify.evaluation import Evaluator
-from tcrctl.identify.least_squares import polish
+from tcrctl.identify.polish import polish
 from tcrctl.identify.problem import distances
 from tcrctl.signals import Array
 

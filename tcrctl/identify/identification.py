@@ -18,9 +18,9 @@ from tcrctl.identify.certainty import Certainty, certainty
 from tcrctl.identify.evaluation import Evaluator, available_cores
 from tcrctl.identify.frame import Frame
 from tcrctl.identify.held_out import held_out_errors
-from tcrctl.identify.least_squares import Residuals, polish
 from tcrctl.identify.loading import LoadedIdentification
 from tcrctl.identify.parameters import start_of, values
+from tcrctl.identify.polish import Residuals, polish
 from tcrctl.identify.problem import MM, Problem, distances
 from tcrctl.identify.result import Group, Result, Stage
 from tcrctl.identify.swarm import search
@@ -229,6 +229,7 @@ def _result(
     return Result(
         spec=spec.name,
         robot=work.loaded.robot.name,
+        base=problem.robot,
         new_robot=f"{work.loaded.robot.name}_identified",
         status="success" if failure is None else "aborted",
         reason="" if failure is None else str(failure),

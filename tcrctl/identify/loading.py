@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from tcrctl import shipped, strict_yaml
-from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.errors import Problem, SpecError
 from tcrctl.identify.parameters import DEFAULT_FACTOR, Parameter, look_up, split, with_values
 from tcrctl.identify.settings import DataSettings, IdentificationSpec, ParameterSettings
 from tcrctl.identify.static_data import Configuration, read_static
@@ -199,12 +199,3 @@ def _reference_misfits(
                 ("frame", "reference"),
                 f"{names} of {configuration.name!r} is not measured in the reference",
             )
-
-
-def is_identification(path: Path) -> bool:
-    """Whether a YAML file says that it is an identification; False if it cannot be read."""
-    try:
-        data = strict_yaml.load(path).data
-    except InputError:
-        return False
-    return isinstance(data, dict) and data.get("kind") == "identification"

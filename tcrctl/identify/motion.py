@@ -47,7 +47,8 @@ def marker_motion(robot: Robot, recording: Recording, step: float) -> Array:
         state.drive[:] = recording.drive[k]
         q[k], v[k] = state.q, state.v
     shapes = _between(recording.time, q, v, recording.frame_time)
-    return shapes.reshape(len(shapes), -1, 3)[:, recording.rows].mean(axis=2)
+    seen: Array = shapes.reshape(len(shapes), -1, 3)[:, recording.rows].mean(axis=2)
+    return seen
 
 
 def _between(time: Array, q: Array, v: Array, at: Array) -> Array:

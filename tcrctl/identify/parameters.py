@@ -112,7 +112,8 @@ def with_values(robot: RobotDescription, changes: Mapping[str, Any]) -> RobotDes
     """
     data = copy.deepcopy(robot.model_dump(mode="json"))
     for path, value in changes.items():
-        keys, place = split(path), data
+        keys = split(path)
+        place: Any = data
         for key in keys[:-1]:
             place = place[key]
         place[keys[-1]] = value

@@ -19,7 +19,7 @@ from tcrctl.identify.log_data import Recording
 from tcrctl.identify.motion import marker_motion
 from tcrctl.identify.parameters import Parameter, values, with_values
 from tcrctl.identify.static_data import Configuration
-from tcrctl.identify.statics import rest_shapes, shape_slopes, twins
+from tcrctl.identify.statics import make_twins, rest_shapes, shape_slopes
 from tcrctl.robot.description import RobotDescription
 from tcrctl.robot.robot import build_robot
 from tcrctl.signals import Array
@@ -121,13 +121,13 @@ class Problem:
         """
         at = values(self.parameters, x)
         robot = build_robot(with_values(self.robot, at))
-        neighbours = twins(lambda v: with_values(self.robot, v), robot, at)
+        twins = make_twins(lambda v: with_values(self.robot, v), robot, at)
         scale = np.array([p.slope(float(u)) for p, u in zip(self.parameters, x, strict=True)])
         parts = []
         for c, drive, q in zip(
             self.configurations, self._drives, rest_shapes(robot, self._drives), strict=True
         ):
-            slopes = shape_slopes(robot, neighbours, q, drive) * scale
+            slopes = shape_slopes(robot, twins, q, drive) * scale
             parts.append(slopes.reshape(-1, 3, len(scale))[np.array(c.rows)].mean(axis=1))
         return self.relative(np.concatenate(parts))
 
@@ -157,7 +157,8 @@ class Problem:
 def distances(frame: Frame, predicted: Array, measured: Array) -> Array:
     """Distance between prediction and measurement (n,) [mm] over the measured coordinates of each point."""
     difference = MM * (frame.place(predicted) - measured)
-    return np.sqrt(np.nansum(difference**2, axis=1))
+    out: Array = np.sqrt(np.nansum(difference**2, axis=1))
+    return out
 
 
 def mean_distance(frame: Frame, predicted: Array, measured: Array) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from tcrctl.identify.certainty import Certainty
 from tcrctl.identify.frame import Frame
 from tcrctl.identify.parameters import Parameter
+from tcrctl.robot.description import RobotDescription
 from tcrctl.signals import Array
 
 
@@ -51,6 +52,7 @@ class Result:
     Attributes:
         spec: Name of the identification.
         robot: Name of the robot it started from.
+        base: The robot it started from, cables given as they were kept.
         new_robot: Name of the robot it ended with.
         status: ``success``, or ``aborted`` with the best answer until then.
         reason: Why it was aborted.
@@ -74,6 +76,7 @@ class Result:
 
     spec: str
     robot: str
+    base: RobotDescription
     new_robot: str
     status: str
     reason: str

@@ -13,7 +13,7 @@ tensions.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,10 +21,10 @@ from tcrctl.elements import sliding_cable
 from tcrctl.errors import NoEquilibriumError
 from tcrctl.robot import linear
 from tcrctl.robot.description import RobotDescription, cable_routes
-from tcrctl.robot.equations import Workspace, assemble, make_workspace, residual
-from tcrctl.robot.equilibrium import equilibrium, static_load
+from tcrctl.robot.equations import Load, Workspace, assemble, make_workspace, residual
+from tcrctl.robot.equilibrium import equilibrium, static_load, with_rest_lengths
 from tcrctl.robot.model import FIXED, Model, build_model, gravity_force, undeformed
-from tcrctl.robot.robot import Robot, build_robot
+from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
 
 #: Relative half step of the derivative of r.
@@ -33,21 +33,43 @@ HALF_STEP = 1e-4
 Describe = Callable[[Mapping[str, float]], RobotDescription]
 
 
-@dataclass(frozen=True, slots=True)
-class Twin:
-    """The robot on either side of one parameter value, and how its rest lengths go.
+class Side(NamedTuple):
+    """The robot with one parameter a little smaller or larger.
 
     Attributes:
-        below: Description with the parameter a little smaller.
-        above: Description with it a little larger.
-        step: Distance between the two, in the parameter's unit.
-        rest_slope: dl0/dζ (m,).
+        model: Its arrays.
+        base: Coordinates of its base nodes (12,) [m].
+        load: Its weight.
     """
 
-    below: RobotDescription
-    above: RobotDescription
+    model: Model
+    base: Array
+    load: Load
+
+
+class Twins(NamedTuple):
+    """The robots on either side of one parameter value, strung as the file says.
+
+    Attributes:
+        below: The parameter is a little smaller.
+        above: It is a little larger.
+        step: Distance between the two, in the parameter's unit.
+    """
+
+    below: Side
+    above: Side
     step: float
-    rest_slope: Array
+
+    def force_slope(self, q: Array, drive: Array) -> Array:
+        """∂r/∂ζ (12 n_modules,) at the shape ``q`` (3 n_nodes,) and ``drive`` (m,)."""
+        low, high = (_at(side, q, drive).r for side in (self.below, self.above))
+        slope: Array = (high - low) / self.step
+        return slope
+
+    @property
+    def base_slope(self) -> Array:
+        """How the base moves (12,)."""
+        return (self.above.base - self.below.base) / self.step
 
 
 def rest_shapes(robot: Robot, drives: Array) -> Array:
@@ -59,98 +81,84 @@ def rest_shapes(robot: Robot, drives: Array) -> Array:
     return np.array([equilibrium(robot.model, drive, robot.weight, robot.rest.q).q for drive in drives])
 
 
-def twins(describe: Describe, robot: Robot, values: Mapping[str, float]) -> tuple[Twin, ...]:
+def shape_slopes(robot: Robot, twins: Sequence[Twins], q: Array, drive: Array) -> Array:
+    """dq/dζ (3 n_nodes, n_parameters) of the equilibrium ``q`` (3 n_nodes,) at ``drive`` (m,).
+
+    Raises:
+        NoEquilibriumError: If the tangent at ``q`` is not positive definite.
+    """
+    return _moved(robot, twins, q, drive, keep_cables=True)
+
+
+def make_twins(describe: Describe, robot: Robot, values: Mapping[str, float]) -> tuple[Twins, ...]:
     """Neighbours of a robot for every parameter.
 
     Args:
         describe: Values by path -> description.
         robot: The robot at ``values``.
         values: Parameter values by path.
+
+    Raises:
+        NoEquilibriumError: If the rest shape is not stable under constant tensions.
     """
     found = []
     for path, value in values.items():
         half = HALF_STEP * (abs(value) or 1.0)
         below, above = (describe({**values, path: value + sign * half}) for sign in (-1.0, 1.0))
-        found.append(Twin(below, above, 2.0 * half, _rest_slope(robot, below, above, 2.0 * half)))
+        found.append(_twins(robot, below, above, half))
     return tuple(found)
 
 
-def shape_slopes(robot: Robot, neighbours: tuple[Twin, ...], q: Array, drive: Array) -> Array:
-    """dq/dζ (3 n_nodes, n_parameters) of the equilibrium ``q`` (3 n_nodes,) at ``drive`` (m,).
-
-    Raises:
-        NoEquilibriumError: If the tangent at ``q`` is not positive definite.
-    """
-    rest = robot.model.cables[:, sliding_cable.REST]
-    forces = []
-    for twin in neighbours:
-        ends = (
-            (d, build_model(d, rest + sign * 0.5 * twin.step * twin.rest_slope))
-            for d, sign in ((twin.below, -1.0), (twin.above, 1.0))
-        )
-        low, high = (_residual_at(d, model, q, drive) for d, model in ends)
-        forces.append((high - low) / twin.step)
-    return _answer(robot, q, drive, np.array(forces), neighbours, keep_cables=True)
-
-
-def _rest_slope(robot: Robot, below: RobotDescription, above: RobotDescription, step: float) -> Array:
-    """dl0/dζ (m,): zero for given rest lengths."""
-    ends = [_strung_at(d, robot.rest.q) for d in (below, above)]
-    if ends[0] is None or ends[1] is None:
-        return np.zeros(robot.n_cables)
+def _twins(robot: Robot, below: RobotDescription, above: RobotDescription, half: float) -> Twins:
+    """Neighbours with the rest lengths that they would be given, to first order."""
+    if any(route.initial_tension is None for route in cable_routes(below)):
+        rest = robot.model.cables[:, sliding_cable.REST]
+        return Twins(_side(below, rest), _side(above, rest), 2.0 * half)
+    low, high = (_side(d, _lengths_under_tension(d, robot.rest.q)) for d in (below, above))
     zero = np.zeros(robot.n_cables)
-    forces = [
-        _residual_at(d, model, robot.rest.q, zero) for d, model in zip((below, above), ends, strict=True)
-    ]
-    force = (forces[1] - forces[0]) / step
-    twin = Twin(below, above, step, zero)
-    slope = _answer(robot, robot.rest.q, zero, force[None], (twin,), keep_cables=False)
-    along = (ends[1].cables[:, sliding_cable.REST] - ends[0].cables[:, sliding_cable.REST]) / step
-    # l0 = l(q0) EA / (EA + T): the first part at fixed q0, the second through q0
+    moved = _moved(robot, [Twins(low, high, 2.0 * half)], robot.rest.q, zero, keep_cables=False)
+    # l0 = l(q0) EA / (EA + T): through T, EA and the geometry at fixed q0, and through q0
     ratio = robot.model.cables[:, sliding_cable.REST] / robot.rest.length
-    ws = make_workspace(robot.model)
-    residual(robot.model, robot.rest.q, zero, static_load(robot.model, robot.weight), ws)
-    through: Array = ratio * (ws.G[:, 3 * FIXED :] @ _free(slope[:, 0]))
-    return along + through
-
-
-def _strung_at(d: RobotDescription, q: Array) -> Model | None:
-    """The model whose cables carry their initial tensions in the shape ``q``; None if it gives rest lengths."""
-    routes = cable_routes(d)
-    tension = np.array(
-        [np.nan if route.initial_tension is None else route.initial_tension for route in routes]
+    gradient = _at(Side(robot.model, robot.rest.q[: 3 * FIXED], low.load), robot.rest.q, zero).G
+    change = half * ratio * (gradient[:, 3 * FIXED :] @ _free(moved[:, 0]))
+    return Twins(
+        low._replace(model=with_rest_lengths(low.model, low.model.cables[:, sliding_cable.REST] - change)),
+        high._replace(model=with_rest_lengths(high.model, high.model.cables[:, sliding_cable.REST] + change)),
+        2.0 * half,
     )
-    if np.isnan(tension).any():
-        return None
-    ea = np.array([route.axial_stiffness for route in routes])
-    model = build_model(d, np.ones(len(routes)))
-    ws = make_workspace(model)
-    _residual_at(d, model, q, np.zeros(len(routes)), ws)
-    return build_model(d, ws.length * ea / (ea + tension))
 
 
-def _residual_at(
-    d: RobotDescription, model: Model, q: Array, drive: Array, ws: Workspace | None = None
-) -> Array:
-    """r (12 n_modules,) [N] of the free nodes at ``q``, with the base of ``d``; fills ``ws`` if given."""
-    ws = make_workspace(model) if ws is None else ws
-    shape = np.concatenate([undeformed(d)[: 3 * FIXED], _free(q)])
+def _side(d: RobotDescription, rest: Array) -> Side:
+    model = build_model(d, rest)
     weight = gravity_force(model, np.array(d.gravity_m_s2, dtype=float))
-    residual(model, shape, drive, static_load(model, weight), ws)
-    return ws.r
+    return Side(model, undeformed(d)[: 3 * FIXED], static_load(model, weight))
 
 
-def _answer(
-    robot: Robot, q: Array, drive: Array, forces: Array, neighbours: Sequence[Twin], *, keep_cables: bool
-) -> Array:
-    """How nodes move (3 n_nodes, n) when r changes by ``forces`` (n, 12 n_modules) per unit of a parameter.
+def _lengths_under_tension(d: RobotDescription, q: Array) -> Array:
+    """Rest lengths (m,) [m] with which the cables carry their initial tensions in the shape ``q``."""
+    routes = cable_routes(d)
+    ea = np.array([route.axial_stiffness for route in routes])
+    tension = np.array([route.initial_tension for route in routes], dtype=float)
+    length: Array = _at(_side(d, np.ones(len(routes))), q, np.zeros(len(routes))).length
+    rest: Array = length * ea / (ea + tension)
+    return rest
+
+
+def _at(side: Side, q: Array, drive: Array) -> Workspace:
+    """Residual, cable gradients and lengths with the free nodes as in ``q``."""
+    ws = make_workspace(side.model)
+    residual(side.model, np.concatenate([side.base, _free(q)]), drive, side.load, ws)
+    return ws
+
+
+def _moved(robot: Robot, twins: Sequence[Twins], q: Array, drive: Array, *, keep_cables: bool) -> Array:
+    """dq/dζ (3 n_nodes, n): A^-1 applied to -∂r/∂ζ.
 
     Args:
         robot: The robot in equilibrium.
-        q: Its shape.
-        drive: Its drives.
-        forces: ∂r/∂ζ for every neighbour.
-        neighbours: For how the base moves.
+        twins: Its neighbours.
+        q: Its shape (3 n_nodes,) [m].
+        drive: Its drives (m,) [m].
         keep_cables: False: cables pull with constant tension, whatever their length.
     """
     ws = make_workspace(robot.model)
@@ -159,11 +167,10 @@ def _answer(
         ws.axial[:] = 0.0
     if linear.factor_shifted(ws.K, ws.U) != 0.0:
         raise NoEquilibriumError("a sensitivity (the tangent is not stable)", np.nan, 0.0, 0)
-    columns = np.ascontiguousarray(-forces.T)
-    linear.couple(ws, np.ascontiguousarray(forces[0]))
+    columns = np.ascontiguousarray(-np.array([pair.force_slope(q, drive) for pair in twins]).T)
+    linear.couple(ws, ws.r)
     linear.solve_many(ws, columns)
-    base = [(undeformed(twin.above) - undeformed(twin.below))[: 3 * FIXED] / twin.step for twin in neighbours]
-    return np.vstack([np.array(base).T, columns])
+    return np.vstack([np.array([pair.base_slope for pair in twins]).T, columns])
 
 
 def _free(q: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +84,9 @@ def polish(evaluator: Evaluator, used: NDArray[np.bool_], best: Best) -> None:
         used: Which coordinates count (n, 3) bool.
         best: Where to start; takes every improvement. Its cost becomes the sum of squares [mm2].
     """
-    from scipy.optimize import least_squares
+    from scipy import optimize
+
+    solve: Any = optimize.least_squares  # a module of the same name confuses the type checker
 
     residuals = Residuals(evaluator, best.frame, used, best)
     n, unknowns = len(best.x), best.frame.unknowns
@@ -91,7 +94,7 @@ def polish(evaluator: Evaluator, used: NDArray[np.bool_], best: Best) -> None:
     if np.all(residuals.value(np.concatenate([best.x, unknowns])) == NO_SHAPE):
         raise NoEquilibriumError("the start of the search", np.nan, 0.0, 0)
     unbounded = np.full(len(unknowns), np.inf)
-    least_squares(
+    solve(
         residuals.value,
         np.concatenate([best.x, unknowns]),
         residuals.jacobian,
