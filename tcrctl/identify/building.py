@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,9 @@ UNIT_FACTOR = 50.0
 #: Relative difference of rest lengths that is no difference.
 SAME_LENGTH = 1e-9
 TENSION = "cables.initial_tension_n"
+#: How the keys of forces, and of what is proportional to them, end.
+FORCES = ("_mpa", "_g", "_n")
+DAMPINGS = ("_n_s_m",)
 
 
 def build_problem(loaded: LoadedIdentification) -> tuple[Problem, str]:
@@ -135,12 +139,29 @@ def _check_size(problem: Problem, predicted: Array) -> None:
     )
 
 
-def assumed_tension(robot: RobotDescription, problem: Problem) -> float | None:
-    """The initial tension [N] if the robot file gives one and it is not to be found."""
-    free = any(parameter.path.endswith("initial_tension_n") for parameter in problem.parameters)
-    return None if free else robot.cables.initial_tension_n
+def assumed_forces(robot: RobotDescription, free: Sequence[str], *, moving: bool) -> dict[str, float]:
+    """Values that fix the scale of forces without having been measured, by path.
+
+    Moduli, masses, tensions and dampings times one factor move nothing. A weighed module fixes that factor; the
+    initial tension is assumed even then. If the module's mass is to be found too, everything else is assumed.
+
+    Args:
+        robot: The robot.
+        free: Paths of what is to be found.
+        moving: Some of the data are of a moving robot, so that dampings count.
+    """
+    keys = FORCES + DAMPINGS if moving else FORCES
+    every = {path: v for path, v in _numbers(robot.model_dump(mode="json")) if path.endswith(keys) and v}
+    fixed = {path: v for path, v in every.items() if path not in free and path != "tension_limit_n"}
+    if "modules.mass_g" in free:
+        return fixed
+    return {path: value for path, value in fixed.items() if path.endswith("initial_tension_n")}
 
 
-def with_tension(robot: RobotDescription, tension: float) -> RobotDescription:
-    """The robot with another initial tension [N]."""
-    return with_values(robot, {TENSION: tension})
+def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """Every number of a robot as plain data, by dotted path."""
+    if isinstance(data, dict | list):
+        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+            yield from _numbers(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(data, float):
+        yield path, data

@@ -37,7 +37,7 @@ class Combination:
     Attributes:
         weights: Relative changes by path (absolute ones of parameters that are 0); the largest is 1.
         std: Standard deviation along it, in units of ``weights``; infinite if the data say nothing.
-        assumed: Path of the assumed value on which it rests; empty if it is uncertain whatever is assumed.
+        assumed: Paths of the assumed values on which it rests; empty if it is uncertain whatever is assumed.
     """
 
     weights: dict[str, float]
@@ -53,8 +53,9 @@ class Combination:
             f"uncertain by {100.0 * self.std:.3g} %" if np.isfinite(self.std) else "not determined at all"
         )
         what = next(iter(self.weights)) if len(self.weights) == 1 else f"the common change of {names}"
-        rests = f" unless {self.assumed} is known: it is assumed, not measured" if self.assumed else ""
-        return f"{what} cannot be identified from these data ({spread}){rests}"
+        if self.assumed:
+            return f"{what} rests on what is assumed, not measured: {self.assumed} (else {spread})"
+        return f"{what} cannot be identified from these data ({spread})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +95,7 @@ def certainty(
         residual: Residual at the answer (r,) [mm].
         noise: Least standard deviation of a coordinate [mm].
         tolerance: Relative uncertainty that counts as not identified.
-        assumed: Path of an assumed value, and the derivative with respect to its relative change (r,) [mm].
+        assumed: Paths of assumed values, and the derivative with respect to their relative change (r,) [mm].
     """
     freedom = len(residual) - slopes.shape[1] - frame_slopes.shape[1]
     spread = float(np.sqrt(residual @ residual / freedom)) if freedom > 0 else 0.0
@@ -105,14 +106,16 @@ def certainty(
         if assumed is not None:
             assumed = (assumed[0], assumed[1] - basis @ (basis.T @ assumed[1]))
     unit = np.array([_tolerance(p, v, tolerance) for p, v in zip(parameters, value, strict=True)])
-    scaled = slopes * unit / sigma
+    aside = np.zeros(len(slopes)) if assumed is None else assumed[1] * tolerance
+    wide = _square(np.column_stack([slopes * unit, aside]) / sigma)
+    scaled = wide[:, :-1]
     covariance = _inverse(scaled) * np.outer(unit, unit)
     std = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore"):
         correlation = covariance / np.outer(std, std)
     found = _combinations(parameters, value, unit, scaled)
     if assumed is not None:
-        found += _resting(parameters, value, unit, scaled, assumed, tolerance, sigma)
+        found += _resting(parameters, value, unit, wide, assumed[0], tolerance / ASSUMED_SPREAD)
     return Certainty(sigma, std, correlation, tuple(found))
 
 
@@ -120,6 +123,12 @@ def _tolerance(parameter: Parameter, value: float, tolerance: float) -> float:
     """Change of a parameter that matters, in its unit."""
     part = RANGE_PART * parameter.slope(parameter.unit(value))
     return min(tolerance * abs(value), part) if value != 0.0 else part
+
+
+def _square(tall: Array) -> Array:
+    """A matrix with the columns' inner products of ``tall`` (r, n), but at least and hardly more than n rows."""
+    r: Array = np.asarray(np.linalg.qr(tall, mode="r"))
+    return np.vstack([r, np.zeros((tall.shape[1] - len(r), tall.shape[1]))])
 
 
 def _inverse(scaled: Array) -> Array:
@@ -135,8 +144,7 @@ def _inverse(scaled: Array) -> Array:
 def _combinations(
     parameters: Sequence[Parameter], value: Array, unit: Array, scaled: Array
 ) -> list[Combination]:
-    _, s, vt = np.linalg.svd(scaled, full_matrices=True)
-    s = np.concatenate([s, np.zeros(len(vt) - len(s))])
+    _, s, vt = np.linalg.svd(scaled, full_matrices=False)
     return [_combination(parameters, value, unit, vt[k], float(s[k])) for k in np.argsort(s) if s[k] < 1.0]
 
 
@@ -159,21 +167,23 @@ def _resting(
     parameters: Sequence[Parameter],
     value: Array,
     unit: Array,
-    scaled: Array,
-    assumed: tuple[str, Array],
-    tolerance: float,
-    sigma: float,
+    wide: Array,
+    assumed: str,
+    prior: float,
 ) -> list[Combination]:
-    """Combinations, of those that are certain, which are so only because of the assumed value."""
+    """Combinations, of those that are certain, which are so only because of the assumed value.
+
+    The last column of ``wide`` is that of the assumed value; ``prior`` is its tolerance over its spread.
+    """
+    scaled = wide[:, :-1]
     _, s, vt = np.linalg.svd(scaled, full_matrices=False)
     certain = vt[s >= 1.0]
     n = len(certain)
-    wide = np.column_stack([scaled @ certain.T, assumed[1] * tolerance / sigma])
-    prior = np.zeros((1, n + 1))
-    prior[0, n] = tolerance / ASSUMED_SPREAD
-    _, s, vt = np.linalg.svd(np.vstack([wide, prior]), full_matrices=False)
+    known = np.append(np.zeros(n), prior)
+    rows = np.column_stack([scaled @ certain.T, wide[:, -1]])
+    _, s, vt = np.linalg.svd(np.vstack([rows, known]), full_matrices=False)
     return [
-        _combination(parameters, value, unit, vt[k, :n] @ certain, float(s[k]), assumed[0])
+        _combination(parameters, value, unit, vt[k, :n] @ certain, float(s[k]), assumed)
         for k in np.argsort(s)
         if s[k] < 1.0 and np.linalg.norm(vt[k, :n]) > 0.5
     ]

@@ -45,7 +45,7 @@ class Evaluator:
     problem: Problem
     jobs: int
     check: Callable[[], None]
-    progress: Callable[[int], None]
+    progress: Callable[[int], None] = lambda evaluations: None
     evaluations: int = 0
     _pool: ProcessPoolExecutor | None = field(default=None, repr=False)
 

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.compilation import announced_compilation
-from tcrctl.errors import DivergenceError, NoEquilibriumError, RunInterruptedError
+from tcrctl.errors import RunInterruptedError
 from tcrctl.identify.best import Best
-from tcrctl.identify.building import assumed_tension, build_problem, choose_frame, with_tension
+from tcrctl.identify.building import assumed_forces, build_problem, choose_frame
 from tcrctl.identify.certainty import Certainty, certainty
 from tcrctl.identify.evaluation import Evaluator, available_cores
 from tcrctl.identify.frame import Frame
 from tcrctl.identify.held_out import held_out_errors
 from tcrctl.identify.loading import LoadedIdentification
-from tcrctl.identify.parameters import start_of, values
+from tcrctl.identify.parameters import start_of, values, with_values
 from tcrctl.identify.polish import Residuals, polish
 from tcrctl.identify.problem import MM, Problem, distances
 from tcrctl.identify.result import Group, Result, Stage
@@ -27,8 +26,8 @@ from tcrctl.identify.swarm import search
 from tcrctl.interruption import Interruption
 from tcrctl.signals import Array
 
-#: Change of the assumed tension for its sensitivity, relative.
-TENSION_STEP = 1e-3
+#: Change of assumed forces for their sensitivity, relative.
+FORCE_STEP = 1e-3
 #: Nearer to a bound than this part of the range, a parameter stands at it.
 AT_BOUND = 1e-3
 
@@ -106,7 +105,7 @@ def identify(
         frame, predicted, remark = choose_frame(loaded, problem)
     best = Best.none(start_of(problem.parameters), frame)
     interruption = Interruption()
-    evaluator = Evaluator(problem, jobs or available_cores(), interruption.check, lambda count: None)
+    evaluator = Evaluator(problem, jobs or available_cores(), interruption.check)
     work = Work(loaded, problem, predicted, frame, evaluator, best)
     evaluator.progress = lambda count: progress(work.doing, count, _shown(work))
     held_out, judged, failure = np.full(len(problem.group_names), np.nan), None, None
@@ -114,9 +113,11 @@ def identify(
         try:
             _search(work)
             work.doing = "certainty"
-            judged = _judge(work)
+            answer = np.concatenate([best.x, best.frame.unknowns])
+            residuals = Residuals(evaluator, best.frame, work.used, Best.none(best.x, best.frame))
+            judged = _judge(work, residuals, answer)
             work.doing = "held-out error"
-            held_out = held_out_errors(evaluator, work.used, work.best)
+            held_out = held_out_errors(evaluator, residuals, answer)
         except RunInterruptedError as error:
             failure = error
     remarks = [remark] * bool(remark) + list(_at_bounds(work))
@@ -152,12 +153,10 @@ def _shown(work: Work) -> float:
     return float(np.sqrt(work.best.cost / count))
 
 
-def _judge(work: Work) -> Certainty:
+def _judge(work: Work, residuals: Residuals, answer: Array) -> Certainty:
     """Sensitivities at the answer, in the parameters' own units, and what they mean."""
     problem, best, spec = work.problem, work.best, work.loaded.spec
-    residuals = Residuals(work.evaluator, best.frame, work.used, Best.none(best.x, best.frame))
-    z = np.concatenate([best.x, best.frame.unknowns])
-    residual, jacobian = residuals.value(z), residuals.jacobian(z)
+    residual, jacobian = residuals.value(answer), residuals.jacobian(answer)
     n = len(best.x)
     value = np.array(list(values(problem.parameters, best.x).values()))
     slope = np.array([p.slope(float(u)) for p, u in zip(problem.parameters, best.x, strict=True)])
@@ -174,27 +173,21 @@ def _judge(work: Work) -> Certainty:
 
 
 def _assumed(work: Work) -> tuple[str, Array] | None:
-    """Derivative with respect to the assumed initial tension; None if there is none."""
+    """Derivative with respect to the scale of the forces that are assumed to be known; None without them."""
     problem, best = work.problem, work.best
-    tension = assumed_tension(problem.robot, problem)
-    if not tension:
+    free = [p.path for p in problem.parameters]
+    forces = assumed_forces(problem.robot, free, moving=bool(problem.recordings))
+    if not forces:
         return None
     ends = []
-    for factor in (1.0 - TENSION_STEP, 1.0 + TENSION_STEP):
-        beside = Problem(
-            with_tension(problem.robot, tension * factor),
-            problem.parameters,
-            problem.configurations,
-            problem.recordings,
-            problem.reference,
-            problem.step,
-        )
-        with suppress(NoEquilibriumError, DivergenceError):
-            ends.append(MM * best.frame.place(beside.predict(best.x))[work.used])
-            work.evaluator.count(1)
-    return (
-        ("cables.initial_tension_n", (ends[1] - ends[0]) / (2.0 * TENSION_STEP)) if len(ends) == 2 else None
-    )
+    for factor in (1.0 - FORCE_STEP, 1.0 + FORCE_STEP):
+        changed = with_values(problem.robot, {path: factor * value for path, value in forces.items()})
+        predicted = Evaluator(replace(problem, robot=changed), 1, work.evaluator.check).predict(best.x)
+        work.evaluator.count(1)
+        if predicted is None:
+            return None
+        ends.append(MM * best.frame.place(predicted)[work.used])
+    return ", ".join(forces), (ends[1] - ends[0]) / (2.0 * FORCE_STEP)
 
 
 def _at_bounds(work: Work) -> list[str]:

@@ -18,8 +18,9 @@ from tcrctl.signals import Array
 #: Residual of every coordinate where the robot has no stable shape [mm]; the step is then refused.
 NO_SHAPE = 1e4
 MAX_EVALUATIONS = 60
-COST_TOLERANCE = 1e-9
-STEP_TOLERANCE = 1e-7
+#: Relative fall of the sum of squares, and relative step, that end the search.
+COST_TOLERANCE = 1e-6
+STEP_TOLERANCE = 1e-6
 
 
 @dataclass
@@ -37,8 +38,8 @@ class Residuals:
     frame: Frame
     used: NDArray[np.bool_]
     best: Best
-    _at: Array | None = None
-    _predicted: Array | None = None
+    _predicted: tuple[Array, Array | None] | None = None
+    _jacobian: tuple[Array, Array] | None = None
 
     def value(self, z: Array) -> Array:
         """Differences [mm] at parameters and frame unknowns z = (x, frame)."""
@@ -57,13 +58,17 @@ class Residuals:
         Raises:
             NoEquilibriumError: If the robot has no stable shape there.
         """
+        if self._jacobian is not None and np.array_equal(self._jacobian[0], z):
+            return self._jacobian[1]
         x, frame = self.split(z)
         predicted = self._prediction(x)
         if predicted is None:
             raise NoEquilibriumError("a sensitivity", np.nan, 0.0, 0)
         slopes = self.evaluator.slopes(x, predicted)
         turned = np.moveaxis(frame.turned(np.moveaxis(slopes, 2, 1)), 1, 2)
-        return MM * np.concatenate([turned, frame.slopes(predicted)], axis=2)[self.used]
+        found = MM * np.concatenate([turned, frame.slopes(predicted)], axis=2)[self.used]
+        self._jacobian = z.copy(), found
+        return found
 
     def split(self, z: Array) -> tuple[Array, Frame]:
         """Parameters and frame of the unknowns."""
@@ -71,9 +76,9 @@ class Residuals:
         return z[:n], self.frame.with_unknowns(z[n:])
 
     def _prediction(self, x: Array) -> Array | None:
-        if self._at is None or not np.array_equal(self._at, x):
-            self._at, self._predicted = x.copy(), self.evaluator.predict(x)
-        return self._predicted
+        if self._predicted is None or not np.array_equal(self._predicted[0], x):
+            self._predicted = x.copy(), self.evaluator.predict(x)
+        return self._predicted[1]
 
 
 def polish(evaluator: Evaluator, used: NDArray[np.bool_], best: Best) -> None:

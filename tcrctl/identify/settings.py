@@ -83,10 +83,10 @@ class FrameSettings(Settings):
 class SwarmSettings(Settings):
     """Particle swarm."""
 
-    particles: int = Field(default=24, ge=2, le=10000, description="number of particles")
-    iterations: int = Field(default=60, ge=1, description="most iterations")
+    particles: int = Field(default=20, ge=2, le=10000, description="number of particles")
+    iterations: int = Field(default=40, ge=1, description="most iterations")
     patience: int = Field(
-        default=12, ge=1, description="ends after so many iterations without an improvement of 0.1 %"
+        default=8, ge=1, description="ends after so many iterations without an improvement of 0.1 %"
     )
 
 
