@@ -1,4 +1,4 @@
-"""``tcrctl identify``: one JSON object, a folder of results, a robot file that runs; from static data and from logs."""
+"""``tcrctl identify``: one JSON object, a folder of results, a robot file that runs."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import json
 from pathlib import Path
 
 import pytest
-from identify_data import CABLES, MASS, ROBOT, SPRINGS, static_data, true_robot
+from identify_data import CABLES, LONG, MASS, ROBOT, SPRINGS, static_data, true_robot
 
 from tcrctl import shipped, strict_yaml
 from tcrctl.cli.app import main
 from tcrctl.experiment import prepare
-from tcrctl.identify.robot_file import robot_text
 from tcrctl.robot.description import load_robot
 from tcrctl.run import run_experiment
 from tcrctl.spec import load_spec
@@ -56,14 +55,22 @@ def answer(capsys, *arguments):
 @pytest.fixture
 def data(tmp_path):
     path = tmp_path / "data.yaml"
-    path.write_text(strict_yaml.dumps(static_data(true_robot(springs=0.75, cables=1.2), noise_mm=0.1)))
+    path.write_text(strict_yaml.dumps(static_data(true_robot(LONG, springs=0.75, cables=1.2), noise_mm=0.1)))
     return path
 
 
 def test_static_data_become_a_robot_file_that_runs(capsys, tmp_path, data, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, found, said = answer(
-        capsys, "--from", data, "--robot", ROBOT, "--params", f"{SPRINGS},{CABLES}", "--method", "least-squares"
+        capsys,
+        "--from",
+        data,
+        "--robot",
+        LONG,
+        "--params",
+        f"{SPRINGS},{CABLES}",
+        "--method",
+        "least-squares",
     )
     assert (code, found["status"]) == (0, "success")
     assert set(found) >= KEYS
@@ -76,21 +83,32 @@ def test_static_data_become_a_robot_file_that_runs(capsys, tmp_path, data, monke
         "robot.yaml", "report.json", "figure.png", "spec.yaml", "spec.resolved.yaml"
     }  # fmt: skip
     assert json.loads((file.parent / "report.json").read_text())["data_sha256"] == found["data_sha256"]
-    assert load_spec("letter_t", [f"robot={file}"]).robot.name == f"{ROBOT}_identified"  # relative to where we are
+    assert (
+        load_spec("letter_t", [f"robot={file}"]).robot.name == f"{LONG}_identified"
+    )  # relative to where we are
 
 
 def test_the_new_robot_file_keeps_every_comment_and_says_where_it_comes_from(capsys, tmp_path, data):
     _, found, _ = answer(
-        capsys, "--from", data, "--robot", ROBOT, "--params", SPRINGS, "--method", "least-squares", "--out", tmp_path
+        capsys,
+        "--from",
+        data,
+        "--robot",
+        LONG,
+        "--params",
+        SPRINGS,
+        "--method",
+        "least-squares",
+        "--out",
+        tmp_path,
     )
     text = Path(found["robot_file"]).read_text()
-    for line in shipped.robots()[ROBOT].read_text().splitlines():
-        if "youngs_modulus_mpa: 90" not in line and "name: tcr5x4" not in line:
+    for line in shipped.robots()[LONG].read_text().splitlines():
+        if "youngs_modulus_mpa: 90" not in line and "name: tcr700" not in line:
             assert line in text
     assert found["data_sha256"] in text
     assert "seed 0" in text
     assert "mm after" in text
-    assert robot_text.__doc__
 
 
 def test_a_log_gives_the_parameters_of_the_robot_that_moved(capsys, tmp_path, log):
@@ -109,7 +127,7 @@ def test_a_log_gives_the_parameters_of_the_robot_that_moved(capsys, tmp_path, lo
 
 def test_freeing_the_mass_is_answered_with_a_warning(capsys, tmp_path, data):
     code, found, said = answer(
-        capsys, "--from", data, "--robot", ROBOT, "--params", f"{SPRINGS},{CABLES},{MASS}",
+        capsys, "--from", data, "--robot", LONG, "--params", f"{SPRINGS},{CABLES},{MASS}",
         "--method", "least-squares", "--out", tmp_path,
     )  # fmt: skip
     assert code == 0
@@ -147,7 +165,7 @@ def test_wrong_usage_is_exit_code_2(capsys, tmp_path, monkeypatch, arguments, me
 
 
 def test_people_get_tables(capsys, tmp_path, data):
-    arguments = ["--robot", ROBOT, "--params", SPRINGS, "--method", "least-squares", "--out", str(tmp_path)]
+    arguments = ["--robot", LONG, "--params", SPRINGS, "--method", "least-squares", "--out", str(tmp_path)]
     assert main(["identify", "--from", str(data), *arguments, "--jobs", "1", "--quiet"]) == 0
     captured = capsys.readouterr()
     for words in (SPRINGS, "held out", "least-squares", "tcrctl run SPEC --set robot="):

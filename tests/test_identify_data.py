@@ -33,7 +33,11 @@ def problems(path: Path) -> list[str]:
 def test_a_table_says_the_same_as_yaml(tmp_path):
     text = HEADER + ROW + "a,12,2,-4,2,ring3,4,,-150\nb,0,0,0,0,end,0,0,-250\n"
     entries = [
-        {"name": "a", "drives_mm": [12, 2, -4, 2], "points_mm": {"m5.apex": [1.5, 2, -300], "ring3": [4, None, -150]}},
+        {
+            "name": "a",
+            "drives_mm": [12, 2, -4, 2],
+            "points_mm": {"m5.apex": [1.5, 2, -300], "ring3": [4, None, -150]},
+        },
         {"name": "b", "drives_mm": [0, 0, 0, 0], "points_mm": {"end": [0, 0, -250]}},
     ]
     other = tmp_path / "data.yaml"
@@ -46,14 +50,23 @@ def test_a_table_says_the_same_as_yaml(tmp_path):
     ("text", "message"),
     [
         (HEADER.replace("z_mm", "z_m") + ROW, ":1:1: column 'z_mm' is missing"),
-        (HEADER.replace("z_mm", "z_m") + ROW, ":1:1: unknown column 'z_m'; allowed: configuration, drive_c1_mm"),
+        (
+            HEADER.replace("z_mm", "z_m") + ROW,
+            ":1:1: unknown column 'z_m'; allowed: configuration, drive_c1_mm",
+        ),
         (HEADER + ROW.replace("1.5", "nan"), ":2:1: x_mm: must be a finite number or empty, not 'nan'"),
         (HEADER + ROW.replace("1.5", "1,5"), ":2:1: the row has not as many cells as the header"),
         (HEADER + ROW.replace("12", ""), ":2:1: drive_c1_mm: a drive length is missing"),
         (HEADER + ROW + ROW, ":3:1: point: 'm5.apex' was measured before in 'a'"),
         (HEADER + ROW + ROW.replace("12", "13").replace("apex", "n1"), "had other drive lengths before"),
-        (HEADER + ROW.replace("m5", "m6"), ":2:1: configurations.0.points_mm.m6.apex: tcr5x4 has no point 'm6.apex'"),
-        (HEADER + ROW.replace("12", "12000"), "12000 mm is outside the stroke, -100 to 200 mm; are these micrometres?"),
+        (
+            HEADER + ROW.replace("m5", "m6"),
+            ":2:1: configurations.0.points_mm.m6.apex: tcr5x4 has no point 'm6.apex'",
+        ),
+        (
+            HEADER + ROW.replace("12", "12000"),
+            "12000 mm is outside the stroke, -100 to 200 mm; are these micrometres?",
+        ),
         (HEADER + ROW.replace("12,2,-4,2", "0.012,0.002,0,0"), "are the lengths in metres?"),
         (HEADER + ROW.replace("1.5,2,-300", ",,"), "nothing is measured in this configuration"),
         (HEADER, "must have at least 1 entries"),
@@ -65,13 +78,15 @@ def test_what_is_wrong_with_a_table_is_said_where_it_stands(tmp_path, text, mess
 
 def test_not_a_number_in_yaml_is_refused(tmp_path):
     path = tmp_path / "data.yaml"
-    path.write_text("configurations:\n  - {name: a, drives_mm: [0, 0, 0, 0], points_mm: {end: [.nan, 0, 0]}}\n")
+    path.write_text(
+        "configurations:\n  - {name: a, drives_mm: [0, 0, 0, 0], points_mm: {end: [.nan, 0, 0]}}\n"
+    )
     assert any("is not a finite number" in problem for problem in problems(path))
 
 
-def refused(tmp_path, **more) -> str:
+def refused(tmp_path, parameters=(SPRINGS,), **more) -> str:
     with pytest.raises(SpecError) as raised:
-        identification(tmp_path, static_data(true_robot()), **more)
+        identification(tmp_path, static_data(true_robot()), parameters, **more)
     return str(raised.value)
 
 
@@ -94,7 +109,7 @@ def refused(tmp_path, **more) -> str:
     ],
 )
 def test_a_parameter_that_cannot_be_one_is_refused(tmp_path, parameters, message):
-    assert message in refused(tmp_path, parameters=parameters)
+    assert message in refused(tmp_path, parameters)
 
 
 @pytest.mark.parametrize(
