@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from typing import Any
 
 import yaml
@@ -67,13 +68,13 @@ def _scalar(node: Node | None, path: str) -> ScalarNode | None:
 
 def _provenance(result: Result) -> str:
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
-    certainty = result.certainty
+    certainty, held_out = result.certainty, result.held_out_error_mm
     lines = [
         f"Identified by tcrctl {__version__} on {now}: {result.spec}, starting from {result.robot}.",
         f"Method {result.method}, seed {result.seed}, status {result.status}, "
         f"{result.evaluations} evaluations.",
         f"Mean error {result.mean_error_before_mm:.4g} mm before, {result.mean_error_after_mm:.4g} mm after, "
-        f"{result.held_out_error_mm:.4g} mm held out.",
+        f"{f'{held_out:.4g} mm' if math.isfinite(held_out) else 'unknown'} held out.",
         f"SHA-256 of the data: {result.data_sha256}.",
     ]
     for i, (p, value) in enumerate(zip(result.parameters, result.values, strict=True)):
