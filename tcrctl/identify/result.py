@@ -115,8 +115,6 @@ class Result:
             robot_file: Where the new robot was written.
             figure: Where the figure was written.
         """
-        certainty = self.certainty
-        std = np.full(len(self.values), np.nan) if certainty is None else certainty.std
         return {
             "status": self.status,
             "reason": self.reason,
@@ -128,61 +126,71 @@ class Result:
             "mean_error_before_mm": _known(self.mean_error_before_mm),
             "mean_error_after_mm": _known(self.mean_error_after_mm),
             "held_out_error_mm": _known(self.held_out_error_mm),
-            "parameters": {
-                p.path: {
-                    "value": float(value),
-                    "std": _known(float(spread)),
-                    "bounds": [p.low, p.high],
-                    "start": p.start,
-                }
-                for p, value, spread in zip(self.parameters, self.values, std, strict=True)
-            },
-            "unidentifiable": []
-            if certainty is None
-            else [
-                {
-                    "combination": c.weights,
-                    "std_percent": _known(100.0 * c.std),
-                    "assumed": c.assumed or None,
-                    "message": str(c),
-                }
-                for c in certainty.combinations
-            ],
+            "parameters": self._parameters(),
+            **_certainty(self.certainty),
             "warnings": list(self.warnings),
-            "correlation": None
-            if certainty is None
-            else [[_known(float(value)) for value in row] for row in certainty.correlation],
-            "sigma_mm": None if certainty is None else certainty.sigma,
-            "configurations": [
-                {
-                    "name": g.name,
-                    "before_mm": _known(g.before_mm),
-                    "after_mm": _known(g.after_mm),
-                    "held_out_mm": _known(g.held_out_mm),
-                }
-                for g in self.groups
-            ],
+            "configurations": [_group(group) for group in self.groups],
             "frame": {
                 "yaw_deg": math.degrees(self.frame.yaw),
                 "offset_mm": [1e3 * float(value) for value in self.frame.offset],
                 "mirrored": self.frame.mirrored,
             },
-            "stages": [
-                {
-                    "method": s.method,
-                    "values": s.values,
-                    "mean_error_mm": _known(s.mean_error_mm),
-                    "evaluations": s.evaluations,
-                    "seconds": round(s.seconds, 3),
-                }
-                for s in self.stages
-            ],
+            "stages": [_stage(stage) for stage in self.stages],
             "evaluations": self.evaluations,
             "seconds": round(self.seconds, 3),
             "data_sha256": self.data_sha256,
             "robot_file": None if robot_file is None else str(robot_file),
             "figure": None if figure is None else str(figure),
         }
+
+    def _parameters(self) -> dict[str, Any]:
+        std = np.full(len(self.values), np.nan) if self.certainty is None else self.certainty.std
+        return {
+            p.path: {
+                "value": float(value),
+                "std": _known(float(spread)),
+                "bounds": [p.low, p.high],
+                "start": p.start,
+            }
+            for p, value, spread in zip(self.parameters, self.values, std, strict=True)
+        }
+
+
+def _certainty(certainty: Certainty | None) -> dict[str, Any]:
+    if certainty is None:
+        return {"unidentifiable": [], "correlation": None, "sigma_mm": None}
+    return {
+        "unidentifiable": [
+            {
+                "combination": c.weights,
+                "std_percent": _known(100.0 * c.std),
+                "assumed": c.assumed or None,
+                "message": str(c),
+            }
+            for c in certainty.combinations
+        ],
+        "correlation": [[_known(float(value)) for value in row] for row in certainty.correlation],
+        "sigma_mm": certainty.sigma,
+    }
+
+
+def _group(group: Group) -> dict[str, Any]:
+    return {
+        "name": group.name,
+        "before_mm": _known(group.before_mm),
+        "after_mm": _known(group.after_mm),
+        "held_out_mm": _known(group.held_out_mm),
+    }
+
+
+def _stage(stage: Stage) -> dict[str, Any]:
+    return {
+        "method": stage.method,
+        "values": stage.values,
+        "mean_error_mm": _known(stage.mean_error_mm),
+        "evaluations": stage.evaluations,
+        "seconds": round(stage.seconds, 3),
+    }
 
 
 def _known(value: float) -> float | None:
