@@ -1,7 +1,8 @@
-"""Experiments, robots and rigs that come with the program, by name.
+"""Experiments, identifications, robots and rigs that come with the program, by name.
 
 Robots lie in the package. Experiments and rigs lie in ``experiments/`` and ``hardware/rigs/`` beside it in a
-checkout, and inside it in an installed wheel.
+checkout, and inside it in an installed wheel. The names of identifications, which lie with the experiments,
+begin with ``identify_``.
 """
 
 from __future__ import annotations
@@ -12,10 +13,20 @@ from pathlib import Path
 from tcrctl.errors import InputError, UnknownNameError
 
 _PACKAGE = Path(__file__).parent
+_IDENTIFY = "identify_"
 
 
 def experiments() -> dict[str, Path]:
     """Return the files of the shipped experiments by name, sorted."""
+    return {name: path for name, path in _experiment_files().items() if not name.startswith(_IDENTIFY)}
+
+
+def identifications() -> dict[str, Path]:
+    """Return the files of the shipped identifications by name, sorted."""
+    return {name: path for name, path in _experiment_files().items() if name.startswith(_IDENTIFY)}
+
+
+def _experiment_files() -> dict[str, Path]:
     inside = _PACKAGE / "experiments"
     return _by_name(inside if inside.is_dir() else _PACKAGE.parent / "experiments")
 
@@ -41,7 +52,25 @@ def find_experiment(name_or_path: str) -> Path:
         UnknownNameError: If there is no shipped experiment of that name.
         InputError: If the path leads to no file.
     """
+    if is_identification(name_or_path):
+        raise InputError(
+            f"{name_or_path} is an identification, not an experiment",
+            hint=f"Start it with: tcrctl identify {name_or_path}",
+        )
     return _find("experiment", name_or_path, experiments(), Path())
+
+
+def find_identification(name_or_path: str) -> Path:
+    """Return the file of an identification.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+
+    Raises:
+        UnknownNameError: If there is no shipped identification of that name.
+        InputError: If the path leads to no file.
+    """
+    return _find("identification", name_or_path, identifications(), Path())
 
 
 def find_robot(name_or_path: str, folder: Path | None = None) -> Path:
@@ -72,6 +101,19 @@ def find_rig(name_or_path: str, folder: Path | None = None) -> Path:
     if folder is not None and is_path(name_or_path) and (folder / Path(name_or_path).expanduser()).is_file():
         return folder / Path(name_or_path).expanduser()
     return _find("rig", name_or_path, rigs(), Path())
+
+
+def is_identification(name_or_path: str) -> bool:
+    """Whether a shipped name or a file is an identification; False if there is none or it cannot be read."""
+    from tcrctl import strict_yaml
+
+    if not is_path(name_or_path):
+        return name_or_path in identifications()
+    try:
+        data = strict_yaml.load(Path(name_or_path).expanduser()).data
+    except InputError:
+        return False
+    return isinstance(data, dict) and data.get("kind") == "identification"
 
 
 def is_path(name_or_path: str) -> bool:

@@ -251,7 +251,8 @@ def _validated(
     name = document.data.get("robot") if isinstance(document.data, dict) else None
     if isinstance(name, str) and name:
         try:
-            robot_path = shipped.find_robot(name, folder)
+            at_hand = document.where(("robot",)).startswith("--set")  # relative to where the user is
+            robot_path = shipped.find_robot(name, Path() if at_hand else folder)
             robot = strict_yaml.validate(strict_yaml.load(robot_path), RobotDescription)
         except SpecError as error:
             problems += error.problems

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Model = TypeVar("Model", bound="BaseModel")
 
-__all__ = ["Document", "Keys", "dumps", "load", "loads", "override", "read", "validate"]
+__all__ = ["Document", "Keys", "dumps", "load", "loads", "override", "placed", "read", "validate"]
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,17 @@ def loads(text: str | bytes, name: str = "<text>") -> Document:
     builder = Builder(name)
     data = builder.build(root)
     return Document(name, data, tuple(builder.broken), root)
+
+
+def placed(name: str, data: Any, places: dict[Keys, str]) -> Document:
+    """Return data from elsewhere, a table for instance, as a document that knows where they came from.
+
+    Args:
+        name: File name for messages.
+        data: Maps, lists, text, numbers, booleans and None.
+        places: ``file:line:column`` of values, or of parents of them.
+    """
+    return Document(name, data, _overridden=dict(places))
 
 
 def _decoded(raw: bytes, name: str) -> str:

@@ -15,6 +15,7 @@ from tcrctl import __version__
 from tcrctl.cli.diff import diff
 from tcrctl.cli.emulate import emulate
 from tcrctl.cli.export import export
+from tcrctl.cli.identify import identify
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
@@ -34,6 +35,7 @@ from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,
+    "identify": identify,
     "list": list_shipped,
     "show": show,
     "validate": validate,

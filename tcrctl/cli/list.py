@@ -11,7 +11,7 @@ from tcrctl.cli.options import AsJson
 
 
 def list_shipped(as_json: AsJson = False) -> None:
-    r"""List the shipped experiments, robots and rigs.
+    r"""List the shipped experiments, identifications, robots and rigs.
 
     \b
     Examples:
@@ -23,12 +23,26 @@ def list_shipped(as_json: AsJson = False) -> None:
     experiments = [
         _entry(name, path, ("description", "robot", "source")) for name, path in shipped.experiments().items()
     ]
+    identifications = [
+        _entry(name, path, ("description", "robot", "source"))
+        for name, path in shipped.identifications().items()
+    ]
     robots = [_entry(name, path, ("description",)) for name, path in shipped.robots().items()]
     rigs = [_entry(name, path, ("description",)) for name, path in shipped.rigs().items()]
     if as_json:
-        print(json.dumps({"experiments": experiments, "robots": robots, "rigs": rigs}))
+        found = {
+            "experiments": experiments,
+            "identifications": identifications,
+            "robots": robots,
+            "rigs": rigs,
+        }
+        print(json.dumps(found))
         return
     _print_table(("EXPERIMENT", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), experiments)
+    print()
+    _print_table(
+        ("IDENTIFICATION", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), identifications
+    )
     print()
     _print_table(("ROBOT", "DESCRIPTION"), ("name", "description"), robots)
     print()

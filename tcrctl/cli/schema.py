@@ -1,4 +1,4 @@
-"""``tcrctl schema``: the JSON Schema of experiment, robot or rig files."""
+"""``tcrctl schema``: the JSON Schema of experiment, robot, rig or identification files."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from tcrctl.cli.options import IsRobot
 def schema(
     robot: IsRobot = False,
     rig: Annotated[bool, typer.Option("--rig", help="Rig files instead of experiments.")] = False,
+    identification: Annotated[
+        bool, typer.Option("--identification", help="Identification files instead of experiments.")
+    ] = False,
 ) -> None:
     r"""Print the JSON Schema of experiment files, for completion and checks in an editor.
 
@@ -23,12 +26,20 @@ def schema(
       # yaml-language-server: $schema=tcrctl.schema.json
     """
     from tcrctl.errors import InputError
+    from tcrctl.identify.settings import IdentificationSpec
     from tcrctl.plant.rig_settings import RigFile
     from tcrctl.robot.description import RobotDescription
+    from tcrctl.settings import Settings
     from tcrctl.spec import ExperimentSpec
 
-    if robot and rig:
-        raise InputError("give --robot or --rig, not both")
-    model = RobotDescription if robot else RigFile if rig else ExperimentSpec
+    kinds: list[tuple[bool, type[Settings]]] = [
+        (robot, RobotDescription),
+        (rig, RigFile),
+        (identification, IdentificationSpec),
+    ]
+    wanted = [kind for given, kind in kinds if given]
+    if len(wanted) > 1:
+        raise InputError("give --robot, --rig or --identification, not several of them")
+    model = wanted[0] if wanted else ExperimentSpec
     made = {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema()}
     print(json.dumps(made, indent=2))

@@ -1,8 +1,14 @@
-"""``tcrctl show SPEC``: an experiment with every default filled in."""
+"""``tcrctl show SPEC``: an experiment, identification or robot with every default filled in."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from tcrctl.cli.options import AsJson, IsRobot, Overrides, Spec
+
+if TYPE_CHECKING:
+    from tcrctl.settings import Settings
 
 
 def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_json: AsJson = False) -> None:
@@ -15,12 +21,23 @@ def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_jso
       tcrctl show --robot tcr700
     """
     from tcrctl import strict_yaml
-    from tcrctl.robot.description import RobotDescription, load_robot
-    from tcrctl.spec import ExperimentSpec, load_spec
 
-    found: ExperimentSpec | RobotDescription
-    found = load_robot(spec, overrides=overrides or ()) if robot else load_spec(spec, overrides or ()).spec
+    found = _found(spec, overrides or (), robot=robot)
     if as_json:
         print(found.model_dump_json())
     else:
         print(strict_yaml.dumps(found.model_dump(mode="json")), end="")
+
+
+def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
+    from tcrctl import shipped
+    from tcrctl.robot.description import load_robot
+    from tcrctl.spec import load_spec
+
+    if robot:
+        return load_robot(name, overrides=overrides)
+    if shipped.is_identification(name):
+        from tcrctl.identify.loading import load_identification
+
+        return load_identification(name, overrides).spec
+    return load_spec(name, overrides).spec

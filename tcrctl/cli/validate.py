@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -16,23 +17,22 @@ def validate(
     robot: IsRobot = False,
     as_json: AsJson = False,
 ) -> None:
-    r"""Check experiment files without running them; exit code 2 if there is a problem.
+    r"""Check experiment and identification files without running them; exit code 2 if there is a problem.
 
     \b
     Examples:
       tcrctl validate my_experiment.yaml
       tcrctl validate letter_t --set controller.horizon_s=0.3
+      tcrctl validate identify_table2
       tcrctl validate --robot my_robot.yaml
     """
     from tcrctl.errors import InputError, Problem, SpecError
-    from tcrctl.robot.description import load_robot
-    from tcrctl.spec import load_spec
 
     problems: list[Problem] = []
     valid: list[str] = []
     for name in specs:
         try:
-            load_robot(name, overrides=overrides or ()) if robot else load_spec(name, overrides or ())
+            _load(name, overrides or (), robot=robot)
             valid.append(name)
         except SpecError as error:
             problems += error.problems
@@ -45,3 +45,19 @@ def validate(
         raise SpecError(list(dict.fromkeys(problems)))  # a bad --set is the same for all
     if as_json:
         print(json.dumps({"status": "ok", "valid": valid}))
+
+
+def _load(name: str, overrides: Sequence[str], *, robot: bool) -> None:
+    """Read a file of any kind with all its checks."""
+    from tcrctl import shipped
+    from tcrctl.robot.description import load_robot
+    from tcrctl.spec import load_spec
+
+    if robot:
+        load_robot(name, overrides=overrides)
+    elif shipped.is_identification(name):
+        from tcrctl.identify.loading import load_identification
+
+        load_identification(name, overrides)
+    else:
+        load_spec(name, overrides)

@@ -1,0 +1,202 @@
+"""``tcrctl identify SPEC``: from measured nodes to a robot file that predicts better."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tcrctl.cli.options import AsJson, Overrides
+
+if TYPE_CHECKING:
+    from tcrctl.identify.loading import LoadedIdentification
+    from tcrctl.identify.result import Result
+
+Inputs = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[SPEC]", help="Shipped identification, or path of a YAML file; after --from: more data."
+    ),
+]
+From = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--from", metavar="DATA...", help="Data instead of a SPEC: logs (.mcap), static sets (.yaml, .csv)."
+    ),
+]
+RobotName = Annotated[
+    str | None,
+    typer.Option("--robot", metavar="ROBOT", help="With --from: robot to start from, name or path."),
+]
+Params = Annotated[
+    str | None,
+    typer.Option(
+        "--params", metavar="PATH,PATH", help="With --from: what to find, e.g. springs.youngs_modulus_mpa."
+    ),
+]
+MethodName = Annotated[
+    str | None, typer.Option("--method", help="pso, least-squares, or both: pso+least-squares (default).")
+]
+StrungBy = Annotated[
+    str | None, typer.Option("--strung-by", help="What stays when parameters change: tension or length.")
+]
+Seed = Annotated[
+    int | None, typer.Option("--seed", metavar="N", min=0, max=2**32 - 1, help="Seed of the swarm.")
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", min=1, metavar="N", help="Worker processes; default: one per core."),
+]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the folder of results is made.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
+
+
+def identify(
+    inputs: Inputs = None,
+    data: From = None,
+    robot: RobotName = None,
+    params: Params = None,
+    method: MethodName = None,
+    strung_by: StrungBy = None,
+    seed: Seed = None,
+    jobs: Jobs = None,
+    overrides: Overrides = None,
+    out: Out = Path("logs"),
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    r"""Find parameters of a robot from measured positions, and say how certain they are.
+
+    The result goes to a new folder DIR/TIME_NAME_ID with robot.yaml, report.json, figure.png and spec.yaml.
+    Ctrl-C keeps the best answer so far.
+
+    \b
+    Examples:
+      tcrctl identify identify_table2
+      tcrctl identify my_data.yaml --method least-squares --json
+      tcrctl identify --from run1.mcap run2.mcap --robot tcr700 \
+                      --params springs.youngs_modulus_mpa,cables.youngs_modulus_mpa
+      tcrctl run helix --set robot=logs/TIME_NAME_ID/robot.yaml
+    """
+    from tcrctl.interruption import signals_exit
+
+    say = (lambda text: None) if quiet else _say
+    changes = [*(overrides or ()), *_assignments(method, strung_by, seed)]
+    with signals_exit():
+        from tcrctl.run_folder import check_writable
+
+        check_writable(out)
+        loaded = _loaded(inputs or [], data, robot, params, changes)
+        say(_headline(loaded))
+        from tcrctl.identify.identification import identify as find
+    with _progress_line(shown=not quiet) as progress:
+        result = find(loaded, jobs=jobs, notify=say, progress=progress)
+    files = _write(loaded, result, out)
+    for warning in result.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    if result.reason:
+        print(f"{result.status}: {result.reason}; this is the best answer until then", file=sys.stderr)
+    if as_json:
+        print(json.dumps(result.as_json(*files)))
+    else:
+        from tcrctl.cli.identify_table import print_result
+
+        print_result(result)
+        print(f"new robot: tcrctl run SPEC --set robot={files[0]}")
+    if result.exit_code:
+        raise typer.Exit(result.exit_code)
+
+
+def _assignments(method: str | None, strung_by: str | None, seed: int | None) -> list[str]:
+    given = {"method": method, "strung_by": strung_by, "seed": seed}
+    return [f"{key}={value}" for key, value in given.items() if value is not None]
+
+
+def _loaded(
+    inputs: list[str], data: list[str] | None, robot: str | None, params: str | None, changes: list[str]
+) -> LoadedIdentification:
+    from tcrctl.errors import InputError
+    from tcrctl.identify.loading import load_identification
+
+    if not data:
+        if robot or params:
+            raise InputError("--robot and --params belong to --from; a SPEC says both itself")
+        if len(inputs) != 1:
+            raise InputError(
+                f"give one SPEC, not {len(inputs)}, or data by --from", hint="See: tcrctl identify --help"
+            )
+        return load_identification(inputs[0], changes)
+    if not robot or not params:
+        raise InputError("--from needs --robot and --params", hint="See: tcrctl identify --help")
+    return _from_data([*data, *inputs], robot, params, changes)
+
+
+def _from_data(data: list[str], robot: str, params: str, changes: list[str]) -> LoadedIdentification:
+    """An identification that was told on the command line."""
+    from tcrctl import strict_yaml
+    from tcrctl.identify.loading import from_document
+
+    told: dict[str, Any] = {
+        "kind": "identification",
+        "name": "identification",
+        "robot": robot,
+        "parameters": {path.strip(): {} for path in params.split(",") if path.strip()},
+        "data": [{"file": str(Path(file).absolute())} for file in data],
+    }
+    places: dict[strict_yaml.Keys, str] = {
+        ("robot",): "--robot",
+        ("parameters",): "--params",
+        ("data",): "--from",
+        **{("data", i): f"--from {file}" for i, file in enumerate(data)},
+    }
+    document = strict_yaml.placed("command line", told, places)
+    return from_document(document, strict_yaml.dumps(told).encode(), Path(), changes)
+
+
+def _write(loaded: LoadedIdentification, result: Result, out: Path) -> tuple[Path, Path]:
+    from tcrctl.identify.report import write_results
+
+    return write_results(loaded, result, out)
+
+
+def _headline(loaded: LoadedIdentification) -> str:
+    spec = loaded.spec
+    amount = [f"{len(loaded.configurations)} configurations"] if loaded.configurations else []
+    amount += [f"{len(loaded.logs)} logs"] if loaded.logs else []
+    return (
+        f"{spec.name}: robot {loaded.robot.name}, {len(loaded.parameters)} parameters, "
+        f"{' and '.join(amount)}, method {spec.method}"
+    )
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _progress_line(*, shown: bool) -> Iterator[Callable[[str, int, float], None]]:
+    """What is being done, evaluations per second and the best error, on stderr if that is a terminal."""
+    if not (shown and sys.stderr.isatty()):
+        yield lambda what, evaluations, best_mm: None
+        return
+    import time
+
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    begin = time.perf_counter()
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("reading data", total=None)
+
+        def show(what: str, evaluations: int, best_mm: float) -> None:
+            rate = evaluations / max(time.perf_counter() - begin, 1e-9)
+            text = f"{what}: {evaluations} evaluations, {rate:.1f}/s, best {best_mm:.4g} mm"
+            bar.update(task, description=text)
+
+        yield show

@@ -1,0 +1,94 @@
+"""Static data as a table (CSV): turned into the document that a YAML file of the same content would give."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tcrctl.errors import Problem, SpecError
+from tcrctl.strict_yaml import Document, Keys, placed, read
+
+_POINT = ("point", "x_mm", "y_mm", "z_mm")
+
+
+def read_table(path: Path, cables: Sequence[str]) -> Document:
+    """Read a table of measured points, one per row.
+
+    Args:
+        path: The file: comma-separated, UTF-8, one header line.
+        cables: Names of the robot's cables.
+
+    Raises:
+        SpecError: If columns are missing or unknown, or a cell is no number; all problems are listed.
+        InputError: If the file cannot be read.
+    """
+    try:
+        text = read(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise SpecError([Problem(f"{path}:1:1", "", f"not UTF-8 text: {error.reason}")]) from None
+    rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
+    drives = [f"drive_{name}_mm" for name in cables]
+    _check_header(path, list(rows.fieldnames or ()), ["configuration", *drives, *_POINT])
+    found, places, problems = _collect(path, rows, drives)
+    if problems:
+        raise SpecError(problems)
+    return placed(str(path), {"configurations": list(found.values())}, places)
+
+
+def _check_header(path: Path, given: list[str], wanted: list[str]) -> None:
+    problems = [f"column {name!r} is missing" for name in wanted if name not in given]
+    problems += [
+        f"unknown column {name!r}; allowed: {', '.join(wanted)}" for name in given if name not in wanted
+    ]
+    problems += [
+        f"column {name!r} stands there twice" for name in sorted({n for n in given if given.count(n) > 1})
+    ]
+    if problems:
+        raise SpecError([Problem(f"{path}:1:1", "", message) for message in problems])
+
+
+def _collect(
+    path: Path, rows: Any, drives: list[str]
+) -> tuple[dict[str, Any], dict[Keys, str], list[Problem]]:
+    """Gather the rows of every configuration; a configuration's drives must agree in all of its rows."""
+    found: dict[str, dict[str, Any]] = {}
+    places: dict[Keys, str] = {}
+    problems: list[Problem] = []
+    for row in rows:
+        where, name = f"{path}:{rows.line_num}:1", (row["configuration"] or "").strip()
+        if None in row or None in row.values():
+            problems.append(Problem(where, "", "the row has not as many cells as the header"))
+            continue
+        numbers = {key: _number(where, key, row[key], problems) for key in (*drives, *_POINT[1:])}
+        problems += [
+            Problem(where, key, "a drive length is missing") for key in drives if not row[key].strip()
+        ]
+        values = [numbers[key] for key in drives]
+        entry = found.setdefault(name, {"name": name, "drives_mm": values, "points_mm": {}})
+        index, point = list(found).index(name), row["point"].strip()
+        places.setdefault(("configurations", index), where)
+        if values != entry["drives_mm"]:
+            problems.append(Problem(where, "", f"configuration {name!r} had other drive lengths before"))
+        if point in entry["points_mm"]:
+            problems.append(Problem(where, "point", f"{point!r} was measured before in {name!r}"))
+        entry["points_mm"][point] = [numbers[key] for key in _POINT[1:]]
+        places["configurations", index, "points_mm", point] = where
+    return found, places, problems
+
+
+def _number(where: str, key: str, text: str, problems: list[Problem]) -> float | None:
+    """A cell as a number; None if it is empty, or, with a problem, if it is none."""
+    if not text.strip():
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if math.isfinite(value):
+        return value
+    problems.append(Problem(where, key, f"must be a finite number or empty, not {text.strip()!r}"))
+    return None
