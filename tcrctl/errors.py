@@ -199,3 +199,31 @@ class LogError(DeviceError):
     def __init__(self, path: object, message: str, *, hint: str = "") -> None:
         super().__init__(f"{path}: {message}", hint=hint)
         self.path = str(path)
+
+
+class RigStopError(StoppedError):
+    """The rig was brought to a safe stop: emergency stop, watchdog, cameras or drives that cannot be trusted.
+
+    Attributes:
+        cause: What made the safety supervisor act.
+    """
+
+    def __init__(self, cause: str, *, hint: str = "") -> None:
+        super().__init__(f"safety stop of the rig: {cause}", hint=hint)
+        self.cause = cause
+
+
+class ArmingRefusedError(StoppedError):
+    """The drives were not armed; nothing has moved.
+
+    Attributes:
+        reasons: Every condition that is not met.
+    """
+
+    def __init__(self, reasons: Sequence[str], *, hint: str = "") -> None:
+        super().__init__(f"the drives are not armed: {'; '.join(reasons)}", hint=hint)
+        self.reasons = tuple(reasons)
+
+
+class UntrustworthyDeviceError(DeviceError):
+    """A device answers, but what it says cannot be true; waiting or asking again does not help."""

@@ -19,7 +19,9 @@ from tcrctl.feasibility import DriveLimits, StaticPath, check_drives, check_feas
 from tcrctl.loop import run_loop, step_count
 from tcrctl.metrics import Metrics
 from tcrctl.pacing import Unpaced
-from tcrctl.plant.plant import Plant
+from tcrctl.plant.bench import build_rig
+from tcrctl.plant.plant import Plant, RunnablePlant
+from tcrctl.plant.session import Session
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
@@ -38,7 +40,7 @@ START_READS: Final = 10
 WARM_UP_STEPS: Final = 3
 
 Notify = Callable[[str], None]
-PlantBuilder = Callable[["Experiment"], tuple[Plant, State | None]]
+PlantBuilder = Callable[["Experiment", Session], tuple[RunnablePlant, State | None]]
 
 
 def silent(text: str) -> None:
@@ -72,6 +74,11 @@ class Experiment:
         return step_count(self.trajectory.duration, self.period)
 
     @property
+    def paced(self) -> bool:
+        """Whether the clock paces every run: a rig cannot be told to wait."""
+        return self.loaded.rig is not None
+
+    @property
     def safety(self) -> SafetyLimits:
         """When a run is stopped."""
         return SafetyLimits(1e-3 * self.spec.safety.position_error_mm, self.robot.tension_limit)
@@ -91,20 +98,29 @@ class Parts:
     """
 
     trajectory: Trajectory
-    plant: Plant
+    plant: RunnablePlant
     estimator: Estimator
     controller: Controller
     start_offset: float
 
 
-def _simulated(experiment: Experiment) -> tuple[Plant, State]:
+def _simulated(experiment: Experiment, session: Session) -> tuple[RunnablePlant, State]:
+    del session
     spec = experiment.spec
+    if not isinstance(spec.plant, SimulatedSettings):
+        raise InputError(f"plant.kind is {spec.plant.kind}, not simulated")
     plant = SimulatedPlant(spec.plant, experiment.robot, experiment.period, spec.seed)
     return plant, plant.state
 
 
+def _rig(experiment: Experiment, session: Session) -> tuple[RunnablePlant, None]:
+    if experiment.loaded.rig is None:
+        raise InputError("the experiment was loaded without a rig file")
+    return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, session), None
+
+
 #: Plant, and its true state if it knows it, for every ``plant.kind``.
-PLANTS: Final[Mapping[str, PlantBuilder]] = {"simulated": _simulated}
+PLANTS: Final[Mapping[str, PlantBuilder]] = {"simulated": _simulated, "rig": _rig}
 
 
 def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = silent) -> Experiment:
@@ -160,16 +176,21 @@ def make_task(experiment: Experiment) -> Task | None:
     return build_task(spec.task, spec.seed, 1e-3 * modules.rod_diameter_mm) if spec.task else None
 
 
-def build_plant(experiment: Experiment) -> tuple[Plant, State | None]:
+def build_plant(experiment: Experiment, session: Session | None = None) -> tuple[RunnablePlant, State | None]:
     """Build the plant; returns its true state too if it knows it.
+
+    Args:
+        experiment: What it is for.
+        session: What the plant may know of the run.
 
     Raises:
         DeviceError: If it cannot be reached.
+        InputError: If a rig does not do what its file says.
     """
-    return PLANTS[experiment.spec.plant.kind](experiment)
+    return PLANTS[experiment.spec.plant.kind](experiment, session or Session())
 
 
-def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> Parts:
+def build_parts(experiment: Experiment, plant: RunnablePlant, state: State | None) -> Parts:
     """Build estimator and controller for a plant at rest, and let the trajectory begin where the plant is.
 
     Args:

@@ -117,11 +117,17 @@ def export_npz(
 
 def _table(log: Log, nodes: bool) -> dict[str, NDArray[Any]]:
     """Every number of every step, each (n_steps,), by full name."""
-    wanted = [name for name, column in COLUMNS.items() if nodes or column.field not in PER_NODE]
+    wanted = [name for name, column in COLUMNS.items() if nodes or not _per_node(column)]
     table: dict[str, NDArray[Any]] = {}
     for name, values in log.columns(wanted).items():
         table |= _flat(name, values, log)
     return table
+
+
+def _per_node(column: Column) -> bool:
+    """Whether a quantity has so many numbers that a table is better off without."""
+    raw = column.path.startswith("measurement.raw.") and column.kind.endswith("[]")
+    return raw or column.field in PER_NODE
 
 
 def _create(out: Path, force: bool, *, binary: bool = False) -> Any:

@@ -12,7 +12,7 @@ from tcrctl.summary import Measures, Numbers
 #: Columns of the table that has one row per step.
 _COLUMNS = (
     "error_x", "error_y", "error_z", "angle", "theta_x", "theta_y", "tension_min", "tension_max",
-    "saturated", "control", "overrun", "iterations", "unsolved",
+    "saturated", "control", "latency", "overrun", "iterations", "unsolved",
 )  # fmt: skip
 
 
@@ -55,6 +55,7 @@ class Metrics:
             tension_n=self._tension(table),
             saturated_fraction=float(np.mean(table["saturated"])) if self._steps else None,
             control_ms=_spread(1e3 * table["control"], "p50", "p99", "max"),
+            latency_ms=_spread(1e3 * table["latency"][~np.isnan(table["latency"])], "p50", "p99", "max"),
             overruns=int(np.sum(table["overrun"])),
             inner_iterations=_spread(table["iterations"], "mean", "max"),
             unconverged_steps=int(np.sum(table["unsolved"])),
@@ -91,7 +92,20 @@ def _loads(step: StepRecord) -> tuple[float, ...]:
 def _timing(step: StepRecord, paced: bool) -> tuple[float, ...]:
     took = step.timing
     busy = took.read + took.estimate + took.control + took.write
-    return took.estimate + took.control, float(paced and max(took.lateness, busy) > step.period)
+    overrun = paced and max(took.lateness, busy) > step.period
+    return took.estimate + took.control, _latency(step, busy), float(overrun)
+
+
+def _latency(step: StepRecord, busy: float) -> float:
+    """Arrival of the camera frame to the answer of the drives [s]; NaN if the step has no frame.
+
+    The run's clock leaves out steps that were missed, so a step that begins later than a period begins on time.
+    """
+    raw, late = step.measurement.raw, step.timing.lateness
+    if raw is None:
+        return float("nan")
+    begun = step.t + (late if late <= step.period else 0.0)
+    return begun + busy - (step.measurement.t + raw.delay)
 
 
 def _solution(step: StepRecord) -> tuple[float, ...]:

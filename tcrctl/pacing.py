@@ -25,6 +25,10 @@ class Pace(Protocol):
         """Time of a clock that never jumps, for measuring durations [s]."""
         ...
 
+    def time(self) -> float:
+        """Time of the run [s]: that of the step that is due now; 0 before the first."""
+        ...
+
 
 def _go_on() -> None:
     """Nothing asks the run to stop."""
@@ -35,13 +39,17 @@ class Unpaced:
 
     def __init__(self, check: Callable[[], None] = _go_on) -> None:
         """Make a pace; ``check`` raises if the run shall stop."""
-        self._check = check
+        self._check, self._time = check, 0.0
 
     def wait(self, t: float) -> float:
         """Do not wait; never late."""
-        del t
         self._check()
+        self._time = t
         return 0.0
+
+    def time(self) -> float:
+        """Return the time of the last step [s]."""
+        return self._time
 
     def now(self) -> float:
         """Return the performance counter [s]."""
@@ -91,3 +99,7 @@ class RealTime:
     def now(self) -> float:
         """Return the clock [s]."""
         return self._clock()
+
+    def time(self) -> float:
+        """Return the time since the start [s]; missed steps are not counted."""
+        return 0.0 if self._start is None else self._clock() - self._start

@@ -19,6 +19,7 @@ from tcrctl.run_folder import RESOLVED, SPEC
 from tcrctl.spec import ExperimentSpec, LoadedSpec
 
 ROBOT: Final = "robot.yaml"
+RIG: Final = "rig.yaml"
 VERSIONS: Final = "versions.json"
 _PACKAGES: Final = (
     "foxglove-schemas-protobuf", "llvmlite", "mcap", "numba", "numpy", "protobuf", "pydantic", "pyyaml", "scipy",
@@ -40,10 +41,12 @@ def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str
     Raises:
         InputError: If the robot's file has gone.
     """
+    rig = {} if loaded.rig is None else {RIG: ("application/yaml", loaded.rig.given)}
     return {
         SPEC: ("application/yaml", loaded.given_text),
         RESOLVED: ("application/yaml", resolved_text(spec)),
         ROBOT: ("application/yaml", strict_yaml.read(loaded.robot_path)),
+        **rig,
         VERSIONS: ("application/json", json.dumps(versions(), indent=2).encode()),
     }
 

@@ -9,24 +9,36 @@ import json
 import math
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
 
 from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedError, TcrctlError
 from tcrctl.experiment import Experiment, Notify, Parts, build_parts, build_plant, make_task, silent
 from tcrctl.interruption import Interruption
 from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.mcap_file import Tap
 from tcrctl.log.writer import LogWriter
 from tcrctl.loop import run_loop
 from tcrctl.metrics import Metrics
 from tcrctl.pacing import Pace, RealTime, Unpaced
+from tcrctl.plant.journal import Journal
+from tcrctl.plant.session import Session
 from tcrctl.provenance import attachments, resolved_text, start_metadata
-from tcrctl.robot.model import FIXED, ring_rows
+from tcrctl.quiet import quiet_interpreter
+from tcrctl.robot.model import FIXED, RIGID_BARS, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.run_folder import LOG, RESOLVED, SPEC, SUMMARY, RunFolder, check_writable, make_run_folder
 from tcrctl.signals import StepRecord
 from tcrctl.summary import Summary, Verdict, judge
+from tcrctl.trajectory.trajectory import Trajectory
+
+#: Points of the drawn path of the reference: as far apart in time as this [s], but no more than these.
+PATH_SPACING_S: Final = 0.1
+MOST_PATH_POINTS: Final = 1000
 
 Progress = Callable[[int, int], None]
 
@@ -40,8 +52,10 @@ def run_experiment(
     *,
     out: Path,
     realtime: bool = False,
+    confirmed: bool = False,
     notify: Notify = silent,
     progress: Progress = _no_progress,
+    tap: Tap | None = None,
 ) -> Summary:
     """Run an experiment and record it.
 
@@ -50,9 +64,11 @@ def run_experiment(
     Args:
         experiment: What :func:`tcrctl.experiment.prepare` made.
         out: Where the run's folder is made.
-        realtime: Pace a simulated plant by the clock.
+        realtime: Pace a simulated plant by the clock; a rig is always paced.
+        confirmed: The operator has agreed that the rig moves; without it a rig is measured, not armed.
         notify: Takes messages for the user.
         progress: Takes the number of steps done and their total, after every step.
+        tap: Takes every message of the log, in the log's thread; see :class:`tcrctl.view.live.LiveView`.
 
     Returns:
         The result; also of a run that was stopped by a limit, a signal or a device.
@@ -61,13 +77,16 @@ def run_experiment(
         DeviceError: If the run cannot be recorded or the plant not be reached; no folder is left behind.
     """
     check_writable(out)
+    realtime = realtime or experiment.paced
     with Interruption() as interruption:
         pace = RealTime(experiment.period, interruption.check) if realtime else Unpaced(interruption.check)
-        plant, state = build_plant(experiment)
+        journal = Journal(pace.time, notify)
+        plant, state = build_plant(experiment, Session(pace.time, journal.report, confirmed))
         try:
             parts = build_parts(experiment, plant, state)
             folder = make_run_folder(out, experiment.spec.name)
-            log = _open_log(experiment, folder, realtime=realtime)
+            log = _open_log(experiment, folder, realtime=realtime, tap=tap)
+            journal.attach(log.event)
         except BaseException:
             plant.close()
             raise
@@ -79,7 +98,7 @@ def run_experiment(
     return summary
 
 
-def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool) -> LogWriter:
+def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap: Tap | None) -> LogWriter:
     """Write what is known before the first step; on failure the folder is as if it had never been."""
     spec, loaded = experiment.spec, experiment.loaded
     try:
@@ -89,7 +108,7 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool) -> L
             folder.path / LOG,
             attachments=attachments(loaded, spec),
             start=start_metadata(folder.run_id, loaded, spec, realtime=realtime),
-            geometry=log_geometry(experiment.robot),
+            geometry=log_geometry(experiment.robot, experiment.trajectory),
             epoch_ns=time.time_ns(),
             period_s=experiment.period,
             flush_s=spec.log.flush_s,
@@ -97,19 +116,29 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool) -> L
             full_state_s=spec.full_state_s,
             fsync=spec.log.fsync,
             wait_when_full=not realtime,
+            tap=tap,
         )
     except BaseException:
         folder.discard()
         raise
 
 
-def log_geometry(robot: Robot) -> LogGeometry:
-    """Return the names and the topology that the log needs to draw a robot."""
+def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeometry:
+    """Return the names and the topology that the log needs to draw a robot, and the path of its end."""
     model, routes = robot.model, []
     for c, name in enumerate(robot.cable_names):
         holes = slice(model.first_hole[c], model.first_hole[c + 1])
         routes.append(CableRoute(name, model.hole_nodes[holes], model.hole_weights[holes]))
-    return LogGeometry(robot.n_modules, tuple(routes), tuple(ring_rows(robot.n_modules)), robot.tip // FIXED)
+    duration = 0.0 if trajectory is None else trajectory.duration
+    points = np.linspace(0.0, duration, min(MOST_PATH_POINTS, 2 + int(duration / PATH_SPACING_S)))
+    return LogGeometry(
+        robot.n_modules,
+        tuple(routes),
+        tuple(ring_rows(robot.n_modules)),
+        robot.tip // FIXED,
+        springs=model.bar_nodes[RIGID_BARS * robot.n_modules :],
+        reference_path=np.zeros((0, 3)) if trajectory is None else trajectory.position(points),
+    )
 
 
 def _recorded_run(
@@ -147,17 +176,19 @@ def _drive(
     failure: TcrctlError | None = None
     try:
         log.event(0.0, "start", *_start_message(parts.start_offset))
-        run_loop(
-            parts.trajectory,
-            parts.estimator,
-            parts.controller,
-            parts.plant,
-            record,
-            period=experiment.period,
-            duration=parts.trajectory.duration,
-            pace=pace,
-            limits=experiment.safety,
-        )
+        with _pace_kept(experiment, pace, log):
+            parts.plant.start()
+            run_loop(
+                parts.trajectory,
+                parts.estimator,
+                parts.controller,
+                parts.plant,
+                record,
+                period=experiment.period,
+                duration=parts.trajectory.duration,
+                pace=pace,
+                limits=experiment.safety,
+            )
     except TcrctlError as error:
         failure = error
     finally:
@@ -166,6 +197,15 @@ def _drive(
         except TcrctlError as error:  # what ended the run first is the reason
             failure = failure or error
     return failure
+
+
+def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractContextManager[None]:
+    """A quiet interpreter for runs that the clock paces."""
+    if not isinstance(pace, RealTime):
+        return nullcontext()
+    rig = experiment.loaded.rig
+    priority = None if rig is None else rig.rig.fifo_priority
+    return quiet_interpreter(priority, lambda text: log.event(0.0, "start", "warning", text))
 
 
 def _start_message(offset: float) -> tuple[str, str]:

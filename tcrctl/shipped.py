@@ -1,7 +1,7 @@
-"""Experiments and robots that come with the program, by name.
+"""Experiments, robots and rigs that come with the program, by name.
 
-Robots lie in the package. Experiments lie in ``experiments/`` beside it in a checkout, and inside it in an
-installed wheel.
+Robots lie in the package. Experiments and rigs lie in ``experiments/`` and ``hardware/rigs/`` beside it in a
+checkout, and inside it in an installed wheel.
 """
 
 from __future__ import annotations
@@ -23,6 +23,12 @@ def experiments() -> dict[str, Path]:
 def robots() -> dict[str, Path]:
     """Return the files of the shipped robots by name, sorted."""
     return _by_name(_PACKAGE / "robot" / "models")
+
+
+def rigs() -> dict[str, Path]:
+    """Return the files of the shipped rigs by name, sorted."""
+    inside = _PACKAGE / "rigs"
+    return _by_name(inside if inside.is_dir() else _PACKAGE.parent / "hardware" / "rigs")
 
 
 def find_experiment(name_or_path: str) -> Path:
@@ -50,6 +56,22 @@ def find_robot(name_or_path: str, folder: Path | None = None) -> Path:
         InputError: If the path leads to no file.
     """
     return _find("robot", name_or_path, robots(), folder or Path())
+
+
+def find_rig(name_or_path: str, folder: Path | None = None) -> Path:
+    """Return the file of a rig.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+        folder: Where a relative path starts; if there is nothing, the working directory is tried.
+
+    Raises:
+        UnknownNameError: If there is no shipped rig of that name.
+        InputError: If the path leads to no file.
+    """
+    if folder is not None and is_path(name_or_path) and (folder / Path(name_or_path).expanduser()).is_file():
+        return folder / Path(name_or_path).expanduser()
+    return _find("rig", name_or_path, rigs(), Path())
 
 
 def is_path(name_or_path: str) -> bool:

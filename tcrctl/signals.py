@@ -38,6 +38,27 @@ class Reference:
 
 
 @dataclass(frozen=True, slots=True)
+class RawFrame:
+    """Markers of one camera frame as they came, before they were mapped to the robot; none if the rig says so.
+
+    Attributes:
+        number: Frame number of the camera system.
+        session: Times that the camera system was restarted before.
+        delay: Time from the middle of the exposure to the arrival here [s].
+        ids: Marker ids (n,) int32.
+        positions: Marker positions in the frame of the cameras (n, 3) float32 [m].
+        flags: Marker flags of the camera system (n,) int32.
+    """
+
+    number: int
+    session: int
+    delay: float
+    ids: NDArray[np.int32]
+    positions: NDArray[np.float32]
+    flags: NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
 class Measurement:
     """What the cameras and the drives report.
 
@@ -46,12 +67,14 @@ class Measurement:
         nodes: Ring node positions (n_markers, 3), single precision as cameras deliver them [m].
         valid: Which markers were seen (n_markers,) bool.
         drive: Drive lengths reported by the actuators (m,) [m].
+        raw: The camera frame it came from; None in simulation, and if no frame came in time.
     """
 
     t: float
     nodes: NDArray[np.float32]
     valid: NDArray[np.bool_]
     drive: Array
+    raw: RawFrame | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,9 @@ from tcrctl.controller.settings import ControllerSettings, IocSettings
 from tcrctl.criterion import CriterionText
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
-from tcrctl.plant.settings import PlantSettings, rings_named
+from tcrctl.kind_switch import without_former_keys
+from tcrctl.plant.rig_file import LoadedRig, load_rig
+from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings, rings_named
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
 from tcrctl.settings import Path as Keys
@@ -112,6 +114,8 @@ def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
             ("trajectory", "kind"),
             f"must be drives with controller.kind: open_loop, not {spec.trajectory.kind}",
         )
+    if not isinstance(spec.plant, SimulatedSettings):
+        return
     step, period = spec.plant.step_ms, spec.controller.period_s
     steps = period * 1e3 / step
     if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
@@ -151,15 +155,16 @@ def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tu
     given: list[tuple[Keys, tuple[float, ...]]] = [
         (("trajectory", "legs", i, "drives_mm"), leg.drives_mm) for i, leg in enumerate(legs)
     ]
-    if spec.plant.start_drives_mm is not None:
-        given.append((("plant", "start_drives_mm"), spec.plant.start_drives_mm))
+    start = spec.plant.start_drives_mm if isinstance(spec.plant, SimulatedSettings) else None
+    if start is not None:
+        given.append((("plant", "start_drives_mm"), start))
     names = [route.name for route in cable_routes(robot)]
     for keys, lengths in given:
         if len(lengths) != len(names):
             has = f"{robot.name} has {len(names)} cables, {', '.join(names)}"
             yield keys, f"{has}; there are {len(lengths)} lengths"
     low, high = robot.stroke_mm
-    for c, length in enumerate(spec.plant.start_drives_mm or ()):
+    for c, length in enumerate(start or ()):
         if not low <= length <= high:
             yield (
                 ("plant", "start_drives_mm", c),
@@ -178,6 +183,8 @@ class LoadedSpec:
         path: The file.
         robot_path: File of the robot.
         overrides: ``--set`` arguments, already applied.
+        rig: The bench, for ``plant.kind: rig``.
+        notes: What the user should know about how the file was read.
     """
 
     spec: ExperimentSpec
@@ -186,6 +193,8 @@ class LoadedSpec:
     path: Path
     robot_path: Path
     overrides: tuple[str, ...]
+    rig: LoadedRig | None = None
+    notes: tuple[str, ...] = ()
 
 
 def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
@@ -203,7 +212,9 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     path = shipped.find_experiment(name_or_path)
     given = strict_yaml.read(path)
     document = strict_yaml.loads(given, str(path))
+    written = document.data
     document, problems = _overridden(document, overrides)
+    document, notes = without_former_keys(document, written, ExperimentSpec)
     spec, robot, robot_path = _validated(document, path.parent, problems)
     problems = [
         Problem(document.where(keys), ".".join(map(str, keys)), message)
@@ -211,7 +222,8 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     ]
     if problems:
         raise SpecError(problems)
-    return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides))
+    rig = load_rig(spec.plant.rig, robot, path.parent) if isinstance(spec.plant, RigSettings) else None
+    return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, notes)
 
 
 def _overridden(

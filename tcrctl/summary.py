@@ -22,6 +22,7 @@ _QUANTITIES: Final = {
     "tension_n": ("N", ("min", "max")),
     "saturated_fraction": ("", ()),
     "control_ms": ("ms", ("p50", "p99", "max")),
+    "latency_ms": ("ms", ("p50", "p99", "max")),
     "overruns": ("", ()),
     "inner_iterations": ("", ("mean", "max")),
     "unconverged_steps": ("", ()),
@@ -89,6 +90,8 @@ class Measures:
         tension_n: Over all cables and steps: ``min``, ``max``.
         saturated_fraction: Part of the steps in which some drive was at its speed limit.
         control_ms: Time that estimator and controller took in a step: ``p50``, ``p99``, ``max``.
+        latency_ms: From the arrival of a camera frame to the answer of the drives to the command made from it,
+            on a rig: ``p50``, ``p99``, ``max``.
         overruns: Steps of a paced run that began late by more than a period, or took longer than one.
         inner_iterations: Iterations of the controller's inner problem: ``mean``, ``max``.
         unconverged_steps: Steps in which controller or estimator found no solution.
@@ -104,6 +107,7 @@ class Measures:
     tension_n: Numbers
     saturated_fraction: float | None
     control_ms: Numbers
+    latency_ms: Numbers
     overruns: int
     inner_iterations: Numbers
     unconverged_steps: int
@@ -142,7 +146,10 @@ class Summary:
     task: dict[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """The object of ``run --json``; numbers that are not finite become null."""
+        """The object of ``run --json``; numbers that are not finite become null; a latency is there on a rig."""
+        measures = dataclasses.asdict(self.measures)
+        if self.measures.latency_ms is None:
+            del measures["latency_ms"]
         head = {
             name: getattr(self, name) for name in ("run_id", "spec", "robot", "plant", "controller", "status")
         }
@@ -151,9 +158,7 @@ class Summary:
             "log": str(self.log),
             "task": self.task,
         }
-        made: dict[str, Any] = _finite(
-            {**head, "reason": self.reason, **dataclasses.asdict(self.measures), **tail}
-        )
+        made: dict[str, Any] = _finite({**head, "reason": self.reason, **measures, **tail})
         return made
 
 

@@ -111,6 +111,8 @@ def _syntax_message(error: yaml.MarkedYAMLError) -> str:
     problem = str(error.problem)
     if "another document" in problem:
         return "more than one document in the file; give one"
+    if "maximum nesting depth" in problem:  # of libyaml, which reads ahead of our own count
+        return f"nested more than {MAX_DEPTH} levels deep"
     hint = "; indent with spaces" if "cannot start any token" in problem else ""
     return f"not YAML: {error.context + ', ' if error.context else ''}{problem}{hint}"
 

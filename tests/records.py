@@ -14,6 +14,7 @@ from tcrctl.signals import (
     ControlInfo,
     Estimate,
     Measurement,
+    RawFrame,
     Reference,
     StepRecord,
     Timing,
@@ -41,7 +42,9 @@ def geometry(n_modules: int = 3, n_cables: int = 3) -> LogGeometry:
         for j in range(n_cables)
     )
     markers = tuple(4 * i + j for i in range(1, n_modules + 1) for j in range(3))
-    return LogGeometry(n_modules, routes, markers, tip_ring=n_modules)
+    springs = np.array([[4 * i + 3, 4 * (i + 1) + j] for i in range(n_modules) for j in range(3)])
+    path = np.stack([np.linspace(0.0, 0.1, 20), np.zeros(20), np.full(20, -0.6)], axis=1)
+    return LogGeometry(n_modules, routes, markers, tip_ring=n_modules, springs=springs, reference_path=path)
 
 
 def shape(t: float, n_modules: int, rng: np.random.Generator) -> np.ndarray:
@@ -133,7 +136,12 @@ def steps(draw: st.DrawFn) -> StepRecord:
     def bools(length: int) -> np.ndarray:
         return np.array(draw(st.lists(st.booleans(), min_size=length, max_size=length)), np.bool_)
 
-    optional = draw(st.tuples(*[st.booleans()] * 4))
+    def integers(length: int) -> np.ndarray:
+        return draw(_bits(np.int32, length))
+
+    optional = draw(st.tuples(*[st.booleans()] * 5))
+    r = draw(st.integers(0, 6))
+    frames = (draw(st.integers(0, 2**63)), draw(st.integers(0, 9)), draw(_NUMBER), integers(r))
     return StepRecord(
         k=draw(st.integers(0, 2**32 - 1)),
         t=draw(_TIME),
@@ -147,7 +155,13 @@ def steps(draw: st.DrawFn) -> StepRecord:
             doubles(m) if optional[3] else None,
         ),
         measurement=Measurement(
-            draw(_NUMBER), draw(_bits(np.float32, 3 * p)).reshape(p, 3), bools(p), doubles(m)
+            draw(_NUMBER),
+            draw(_bits(np.float32, 3 * p)).reshape(p, 3),
+            bools(p),
+            doubles(m),
+            RawFrame(*frames, draw(_bits(np.float32, 3 * r)).reshape(r, 3), integers(r))
+            if optional[4]
+            else None,
         ),
         estimate=Estimate(
             draw(_NUMBER),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,10 +16,12 @@ from mcap.records import Attachment, Channel, Message, Metadata
 from mcap.stream_reader import StreamReader
 
 from tcrctl.errors import InputError, LogError, UnknownNameError
-from tcrctl.log.columns import COLUMNS
+from tcrctl.log.columns import COLUMNS, stack
 from tcrctl.log.reader import read_log
 from tcrctl.log.schema import descriptor_set, public_descriptor
 from tcrctl.log.steps import StepDecoder, StepEncoder
+from tcrctl.log.viewer_topics import TOPICS
+from tcrctl.signals import RawFrame
 
 
 @pytest.fixture
@@ -149,7 +152,7 @@ def test_every_unit_of_the_step_is_in_the_channel_metadata(finished):
     for column in COLUMNS.values():
         assert step.metadata.get(f"unit.{column.path}", "") == column.unit
     derived = {channel.topic for channel in channels if channel.metadata.get("derived") == "true"}
-    assert derived == {"/log", "/tf", "/tip/measured", "/tip/reference", "/backbone", "/scene"}
+    assert derived == {"/log", *TOPICS}
 
 
 def test_an_independent_checker_finds_no_fault(finished, tmp_path):
@@ -166,7 +169,7 @@ def test_columns_are_the_steps_stacked(finished):
     log = read_log(finished)
     columns = log.columns()
     steps = list(log.steps())
-    assert set(columns) == set(COLUMNS)
+    assert set(columns) == {name for name in COLUMNS if not name.startswith("measurement_raw_")}
     np.testing.assert_array_equal(columns["estimate_q"], [step.estimate.q for step in steps])
     np.testing.assert_array_equal(columns["k"], np.arange(40))
     assert columns["measurement_nodes"].dtype == np.float32
@@ -213,3 +216,18 @@ def test_what_is_not_a_log_is_named_as_such(tmp_path):
         with pytest.raises(InputError, match=message) as caught:
             read_log(path)
         assert caught.value.exit_code == 2
+
+
+def test_columns_of_camera_frames_have_a_gap_where_no_frame_came():
+    raw = RawFrame(
+        7, 0, 0.004, np.array([1, 2], np.int32), np.ones((2, 3), np.float32), np.zeros(2, np.int32)
+    )
+    steps = [records.record(k) for k in range(3)]
+    steps[1] = replace(steps[1], measurement=replace(steps[1].measurement, raw=raw))
+    names = [name for name in COLUMNS if name.startswith("measurement_raw_")]
+    columns = stack(steps, names)
+    assert list(columns) == names
+    assert columns["measurement_raw_number"].tolist() == [-1, 7, -1]
+    assert columns["measurement_raw_ids"].tolist() == [[-1, -1], [1, 2], [-1, -1]]
+    assert np.isnan(columns["measurement_raw_positions"]).all(axis=(1, 2)).tolist() == [True, False, True]
+    assert stack(steps[:1], names) == {}

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import records
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from log_files import STOP, doctor, open_log
 
@@ -54,6 +54,7 @@ def test_zigzag_and_planes_can_be_undone(numbers):
 
 
 @given(records.steps(), records.steps(), st.booleans())
+@settings(max_examples=30)
 def test_lean_steps_keep_arbitrary_input_bit_for_bit(first, second, same_markers):
     first = dataclasses.replace(first, k=1)
     second = dataclasses.replace(second, k=2)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 import records
+from foxglove import messages
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from log_files import STOP, open_log
 from mcap.reader import make_reader
@@ -14,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from tcrctl.log.reader import read_log
 from tcrctl.log.ring_frames import quaternion_of_normal, quaternions, ring_frames
-from tcrctl.log.viewer_topics import SCENE_RATE_HZ, VIEWER_RATE_HZ, stride
+from tcrctl.log.viewer_topics import SCENE_RATE_HZ, TOPICS, VIEWER_RATE_HZ, stride
 
 
 @pytest.fixture
@@ -42,18 +44,22 @@ def test_frames_on_tf_carry_ring_coordinates_to_the_world(finished):
         assert schema.name == "foxglove.FrameTransforms"
         shape = steps[message.sequence].truth.q.reshape(-1, 4, 3)
         transforms = _decoded(schema, message).transforms
-        assert [frame.child_frame_id for frame in transforms] == ["base", "m1", "m2", "m3"]
+        assert [frame.child_frame_id for frame in transforms] == ["base", "m1", "m2", "m3", "reference"]
+        wanted = transforms.pop()
+        np.testing.assert_allclose(
+            _xyz(wanted.translation), steps[message.sequence].reference.position, atol=1e-5
+        )
         for frame, module in zip(transforms, shape, strict=True):
             rotation = Rotation.from_quat([getattr(frame.rotation, axis) for axis in "xyzw"])
             origin = np.array([getattr(frame.translation, axis) for axis in "xyz"])
             radius = np.linalg.norm(module[0] - module[:3].mean(axis=0))
-            np.testing.assert_allclose(rotation.apply([radius, 0, 0]) + origin, module[0], atol=3e-5)
+            np.testing.assert_allclose(rotation.apply([radius, 0, 0]) + origin, module[0], atol=2e-5)
             assert rotation.apply([0, 0, 1])[2] > 0.9
             checked += 1
     assert checked == 4 * 40
 
 
-def test_the_scene_draws_every_rod_and_colours_cables_by_tension(finished):
+def test_the_scene_draws_every_rod_and_spring_and_colours_cables_by_tension(finished):
     steps = {step.k: step for step in read_log(finished).steps()}
     scenes = list(_messages(finished, "/scene"))
     assert [message.sequence for _, message in scenes] == list(range(0, 40, 4))
@@ -62,13 +68,70 @@ def test_the_scene_draws_every_rod_and_colours_cables_by_tension(finished):
         entities = {entity.id: entity for entity in _decoded(schema, message).entities}
         nodes = steps[message.sequence].truth.q.reshape(-1, 3)
         rods = entities["rods"].lines[0]
-        points = np.array([[p.x, p.y, p.z] for p in rods.points])
-        np.testing.assert_allclose(points, nodes, atol=5e-5)
+        np.testing.assert_allclose(_points(rods), nodes, atol=7e-5)
         ends = np.array(rods.indices).reshape(-1, 2)
         assert {tuple(pair) for pair in ends} == {(4 * i + j, 4 * i + 3) for i in range(4) for j in range(3)}
+        springs = _points(entities["springs"].lines[0]).reshape(-1, 2, 3)
+        np.testing.assert_allclose(springs, nodes[records.geometry().springs], atol=7e-5)
         red = [entities[f"cable c{j}"].lines[0].color.r for j in (1, 2, 3)]
         assert list(np.argsort(red)) == list(np.argsort(steps[message.sequence].truth.tension))
-        assert sum(name.startswith("ring ") for name in entities) == 4
+
+
+def test_what_stands_still_in_its_frame_is_drawn_once(finished):
+    ((schema, message),) = _messages(finished, "/scene/static")
+    assert message.sequence == 0
+    entities = {entity.id: entity for entity in _decoded(schema, message).entities}
+    frames = {f"ring {name}": name for name in ("base", "m1", "m2", "m3")} | {"wanted end": "reference"}
+    assert {name: entities[name].frame_id for name in frames} == frames
+    assert all(entities[name].frame_locked for name in frames)
+    for name in list(frames)[:4]:
+        np.testing.assert_allclose(np.linalg.norm(_points(entities[name].lines[0]), axis=1), 0.035, atol=2e-4)
+    for name in ("ring m3", "wanted end"):
+        turn = entities[name].arrows[0].pose.orientation
+        along = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).apply([1.0, 0.0, 0.0])
+        np.testing.assert_allclose(along, [0.0, 0.0, -1.0], atol=1e-12)
+    path = records.geometry().reference_path
+    np.testing.assert_allclose(_points(entities["wanted path"].lines[0]), path, atol=7e-5)
+
+
+def test_a_free_orientation_has_no_wanted_axis(tmp_path):
+    step = records.record(0)
+    free = dataclasses.replace(step, reference=dataclasses.replace(step.reference, normal=None))
+    with open_log(tmp_path / "log.mcap") as log:
+        log.step(free)
+        log.finish(STOP)
+    ((schema, message),) = _messages(tmp_path / "log.mcap", "/scene/static")
+    (wanted,) = (entity for entity in _decoded(schema, message).entities if entity.id == "wanted end")
+    assert (len(wanted.spheres), len(wanted.arrows)) == (1, 0)
+
+
+@pytest.mark.parametrize("topic", [*TOPICS, "/log"])
+def test_schemas_are_those_of_foxglove(finished, topic):
+    """Their own kit is the judge: every field of ours has the same name, number, type and place there."""
+    with open(finished, "rb") as stream:
+        summary = make_reader(stream).get_summary()
+    (channel,) = (channel for channel in summary.channels.values() if channel.topic == topic)
+    ours = summary.schemas[channel.schema_id]
+    theirs = getattr(messages, ours.name.removeprefix("foxglove.")).get_schema()
+    assert (ours.name, ours.encoding, channel.message_encoding) == (theirs.name, theirs.encoding, "protobuf")
+    assert _fields(ours.data) <= _fields(theirs.data)
+    assert any(name.startswith(ours.name + ".") for name, *_ in _fields(ours.data))
+
+
+def _fields(schema):
+    """Every field of every message type of a schema, as name, number, type and label."""
+    return {
+        (
+            f".{file.package}.{message.name}.{field.name}"[1:],
+            field.number,
+            field.type,
+            field.label,
+            field.type_name,
+        )
+        for file in descriptor_pb2.FileDescriptorSet.FromString(schema).file
+        for message in file.message_type
+        for field in message.field
+    }
 
 
 def test_an_unseen_end_marker_or_a_broken_shape_draws_nothing(tmp_path):
@@ -79,7 +142,7 @@ def test_an_unseen_end_marker_or_a_broken_shape_draws_nothing(tmp_path):
     with open_log(path) as log:
         log.step(step)
         log.finish(STOP)
-    for topic in ("/tip/measured", "/tf", "/backbone"):
+    for topic in ("/tip/measured", "/tf", "/backbone", "/scene", "/scene/static"):
         assert list(_messages(path, topic)) == []
     assert len(list(_messages(path, "/tip/reference"))) == 1
 
@@ -101,6 +164,14 @@ def test_ring_frames_move_with_the_ring():
     centre, quaternion = ring_frames((turn.apply(ring) + shift)[None])
     np.testing.assert_allclose(centre[0], shift, atol=1e-15)
     np.testing.assert_allclose((Rotation.from_quat(quaternion[0]) * turn.inv()).magnitude(), 0, atol=1e-7)
+
+
+def _xyz(vector):
+    return [vector.x, vector.y, vector.z]
+
+
+def _points(line):
+    return np.array([_xyz(point) for point in line.points])
 
 
 def _messages(path: Path, topic: str):

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tcrctl.criterion import parse_criterion
 from tcrctl.metrics import Metrics
 from tcrctl.numerics.rotation import normal_from_angles
-from tcrctl.signals import Timing
+from tcrctl.signals import RawFrame, Timing
 from tcrctl.summary import UNITS, Summary, judge
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -129,8 +129,10 @@ KEYS = [
 def test_the_object_has_every_key_in_order_and_every_unit_names_a_number():
     made = summary(measures([step(k, turn=(0.1, 0.0)) for k in range(3)])).as_json()
     assert list(made) == KEYS
+    on_a_rig = summary(measures([framed(k) for k in range(3)])).as_json()
+    assert set(on_a_rig) == {*KEYS, "latency_ms"}
     for name in UNITS:
-        value = made
+        value = on_a_rig if name.startswith("latency_ms") else made
         for part in name.split("."):
             value = value[part]
         assert isinstance(value, int | float)
@@ -170,3 +172,25 @@ def test_criteria_reach_into_what_the_task_asks():
     criterion = parse_criterion("task.targets.1.beam_passes == true")
     result = {"task": {"targets": [{"beam_passes": False}, {"beam_passes": True}]}}
     assert judge([criterion], result)[0].passed
+
+
+def framed(k, *, lateness=0.0, delay=0.004, age=0.010, busy=0.006):
+    """Step k whose camera frame was exposed ``age`` before the step's time and arrived ``delay`` later [s]."""
+    none = np.zeros(0, np.int32)
+    raw = RawFrame(k, 0, delay, none, np.zeros((0, 3), np.float32), none)
+    made = step(k, truth=False)
+    measurement = replace(made.measurement, t=made.t - age, raw=raw)
+    return replace(
+        made, measurement=measurement, timing=Timing(busy / 4, busy / 4, busy / 4, busy / 4, lateness)
+    )
+
+
+def test_latency_is_from_the_arrival_of_a_frame_to_the_answer_of_the_drives():
+    found = measures(
+        [framed(0), framed(1, lateness=0.02), framed(2, lateness=records.PERIOD_S + 0.01), step(3)]
+    )
+    early, late = 12.0, 32.0  # a step that is late by more than a period moves the clock of the run
+    assert found.latency_ms == pytest.approx(
+        {"p50": early, "p99": early + 0.98 * (late - early), "max": late}
+    )
+    assert measures([step(k) for k in range(3)]).latency_ms is None

@@ -151,6 +151,14 @@ def test_a_failed_job_is_a_row_with_its_reason(program, reason, tmp_path):
     assert reason in line.reason
 
 
+def test_that_a_run_was_stopped_is_a_result_where_the_row_says_so(tmp_path):
+    job = Script("a", 'print(\'{"x": 70.0, "reason": "diverged"}\'); raise SystemExit(4)')
+    done = collected([job], tmp_path)
+    may = make_line(row(job, None, None, text=lambda results: "diverges", may_stop=True), done)
+    assert (may.verdict, may.value, may.measured, may.reason) == ("shown", 70.0, "diverges", "")
+    assert make_line(row(job, None, None), done).verdict == "failed"
+
+
 def test_a_run_that_misses_its_own_criterion_is_still_measured(tmp_path):
     job = Script("a", 'print(\'{"x": 0.5, "log": "l.mcap"}\'); raise SystemExit(3)')
     line = make_line(row(job), collected([job], tmp_path))

@@ -402,7 +402,8 @@ def running(tmp_path_factory):
     folders = {name: tmp_path_factory.mktemp(name) for name in ("int", "term", "kill", "json")}
     processes = {}
     for name, folder in folders.items():
-        options = ["--realtime", "--out", str(folder), *(["--json"] if name == "json" else [])]
+        long = ["--set", "trajectory.settle_s=90"]  # so that none is over before its signal on a busy machine
+        options = ["--realtime", *long, "--out", str(folder), *(["--json"] if name == "json" else [])]
         processes[name] = start(*options, cwd=folder)
     yield {name: (processes[name], folders[name]) for name in folders}
     for process in processes.values():
@@ -438,7 +439,7 @@ def test_a_signal_ends_a_run_with_a_complete_log(running, name, number, code):
     assert log.stop["status"] == "aborted"
     assert signal.Signals(number).name in log.stop["reason"]
     assert steps == list(range(len(steps)))
-    assert len(steps) < 600
+    assert len(steps) < 2300
     assert "Traceback" not in err
     result = json.loads((path.parent / "summary.json").read_text())
     assert (result["status"], result["steps"]) == ("aborted", len(steps))
@@ -457,7 +458,10 @@ def test_a_killed_run_keeps_all_steps_but_those_of_the_last_flush_interval(runni
     process.communicate(timeout=20)
     log = read_log(path)
     steps = [s.k for s in log.steps()]
-    elapsed = killed - int(log.start["epoch_ns"]) * 1e-9
+    late = log.columns(["timing_lateness"])["timing_lateness"]
+    elapsed = (
+        killed - int(log.start["epoch_ns"]) * 1e-9 - late[late > 0.05].sum()
+    )  # missed steps are not made up for
     assert not log.complete
     assert steps == list(range(len(steps)))
     flushed = elapsed - 0.5 - 0.3  # flush interval, and time for a busy machine

@@ -47,6 +47,18 @@ BELOW = (
         ("box_scan", "task.objects.0.position_mm=[99, 0, 0]", "task.objects.0.position_mm", "not inside"),
         ("box_scan", "task.box.holes.0.diameter_mm=120", "task.box.holes.0", "left wall"),
         ("box_scan", "task.box.holes.1.wall=left", "task.box.holes.1", "overlaps the hole left"),
+        (
+            "box_scan",
+            "task.box.markers_mm=[[175, 44, -429], [175, -44, -517], [175, -44, -429], [175, 44, -517]]",
+            "task.box.markers_mm",
+            "face each other",
+        ),
+        (
+            "box_scan",
+            "task.box.markers_mm=[[1, 2, 3], [1, 2, 3], [1, 2, 3], [1, 2, 3]]",
+            "markers_mm",
+            "one place",
+        ),
         ("box_scan", "criteria=[task.detectd == 3]", "criteria.0", "task.detected"),
         ("letter_t", "criteria=[task.detected == 3]", "criteria.0", "no result task.detected"),
     ],

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from pydantic import RootModel
 from records import record
 
-from tcrctl.numerics.bore import Bore
 from tcrctl.numerics.perforated_plate import blocks, nearest
 from tcrctl.numerics.rotation import matrix_from_quaternion, quaternion_exp
 from tcrctl.robot import pose
@@ -156,7 +155,6 @@ def test_the_worst_step_of_a_dwell_decides():
     (target,) = task.result()["targets"]
     assert not target["beam_passes"]
     assert target["position_error_mm"] == pytest.approx(1.0)
-    assert target["theta_x_error_rad"] == pytest.approx(0.0, abs=1e-9) or target["theta_y_error_rad"] > 0.0
     assert target["theta_y_error_rad"] == pytest.approx(slope)
     assert target["bore_clearance_mm"] == pytest.approx(7.5 - 1.0 - 250.0 * math.tan(slope))
     assert target["spot_offset_mm"] is None
@@ -271,7 +269,3 @@ def test_the_body_is_made_of_rods_and_closed_rings(tcr700):
     assert segment_name(0) == "rod base.n1"
     assert segment_name(len(start) - 1) == "ring m13"
     assert segment_name(13 * (3 + SIDES) + 2) == "rod m13.n3"
-
-
-def test_a_bore_is_what_the_markers_say():
-    assert isinstance(pipe_from_markers(parsed(LASER).pipes[0]).bore, Bore)

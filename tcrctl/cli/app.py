@@ -13,13 +13,18 @@ import typer
 
 from tcrctl import __version__
 from tcrctl.cli.diff import diff
+from tcrctl.cli.emulate import emulate
 from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.paper import paper
+from tcrctl.cli.play import play
+from tcrctl.cli.plot import plot
 from tcrctl.cli.recover import recover
 from tcrctl.cli.replay import replay
+from tcrctl.cli.report import report
+from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
@@ -38,9 +43,13 @@ VERBS: dict[str, Callable[..., None]] = {
     "info": info,
     "recover": recover,
     "export": export,
+    "emulate": emulate,
     "paper": paper,
     "replay": replay,
     "diff": diff,
+    "play": play,
+    "plot": plot,
+    "report": report,
 }
 
 
@@ -68,6 +77,10 @@ def build_app() -> typer.Typer:
     app.callback()(_options)
     for name, verb in VERBS.items():
         app.command(name)(verb)
+    rig = typer.Typer(no_args_is_help=True, rich_markup_mode="rich")
+    for name, verb in RIG_VERBS.items():
+        rig.command(name)(verb)
+    app.add_typer(rig, name="rig", help="Work on a bench: check, status, calibrate, zero, jog, reset.")
     return app
 
 

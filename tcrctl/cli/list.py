@@ -11,7 +11,7 @@ from tcrctl.cli.options import AsJson
 
 
 def list_shipped(as_json: AsJson = False) -> None:
-    r"""List the shipped experiments and robots.
+    r"""List the shipped experiments, robots and rigs.
 
     \b
     Examples:
@@ -24,12 +24,15 @@ def list_shipped(as_json: AsJson = False) -> None:
         _entry(name, path, ("description", "robot", "source")) for name, path in shipped.experiments().items()
     ]
     robots = [_entry(name, path, ("description",)) for name, path in shipped.robots().items()]
+    rigs = [_entry(name, path, ("description",)) for name, path in shipped.rigs().items()]
     if as_json:
-        print(json.dumps({"experiments": experiments, "robots": robots}))
+        print(json.dumps({"experiments": experiments, "robots": robots, "rigs": rigs}))
         return
     _print_table(("EXPERIMENT", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), experiments)
     print()
     _print_table(("ROBOT", "DESCRIPTION"), ("name", "description"), robots)
+    print()
+    _print_table(("RIG", "DESCRIPTION"), ("name", "description"), rigs)
 
 
 def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:

@@ -140,6 +140,5 @@ def _print_table(report: Report) -> None:
     for line in report.lines:
         table.add_row(*(escape(cell) for cell in line.cells()), style=_STYLES.get(line.verdict, ""))
     console.print(table)
-    for note in report.notes():
-        console.print(note, markup=False, highlight=False)
+    console.print(" ".join(report.notes()), markup=False, highlight=False)
     print(f"report: {report.folder}")

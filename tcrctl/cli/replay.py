@@ -66,6 +66,7 @@ def replay(
       tcrctl replay log.mcap --set controller.horizon_s=1.0 --plot longer.png
       tcrctl replay log.mcap --from 100 --to 200 --rtol 1e-9 --json
     """
+    from tcrctl.compilation import announced_compilation
     from tcrctl.replay.figure import WhatIf, check_format, save
     from tcrctl.replay.replay import replay as run_replay
     from tcrctl.replay.result import Tolerance, checked_window
@@ -74,7 +75,7 @@ def replay(
     if plot is not None:
         check_format(plot)
         drawing = WhatIf()
-    with progress_bar("replay") as progress:
+    with announced_compilation(_announce_compilation), progress_bar("replay") as progress:
         found = run_replay(
             log,
             overrides=overrides or (),
@@ -93,6 +94,10 @@ def replay(
         _print(found)
     if found.exit_code:
         raise typer.Exit(found.exit_code)
+
+
+def _announce_compilation() -> None:
+    print("compiling numerical kernels (first run only) ...", file=sys.stderr, flush=True)
 
 
 def _announce(changes: Sequence[Change]) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +17,7 @@ from tcrctl.cli.progress import progress_bar
 if TYPE_CHECKING:
     from tcrctl.experiment import Experiment, Notify
     from tcrctl.feasibility import StaticPath
+    from tcrctl.log.mcap_file import Tap
     from tcrctl.spec import LoadedSpec
     from tcrctl.summary import Summary
 
@@ -27,6 +30,14 @@ Seed = Annotated[
     int | None, typer.Option("--seed", metavar="N", min=0, max=2**63 - 1, help="Seed of everything random.")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Run even if the trajectory seems infeasible.")]
+View = Annotated[bool, typer.Option("--view", help="Show the run in the Foxglove app while it runs.")]
+ViewHost = Annotated[
+    str, typer.Option("--view-host", metavar="ADDRESS", help="Where to serve it; 0.0.0.0 for everybody.")
+]
+ViewPort = Annotated[
+    int, typer.Option("--view-port", metavar="N", min=0, max=65535, help="Port of it; 0 takes a free one.")
+]
+Yes = Annotated[bool, typer.Option("--yes", help="A rig: the drives may be armed and move; nobody is asked.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
@@ -38,6 +49,10 @@ def run(
     out: Out = Path("logs"),
     seed: Seed = None,
     force: Force = False,
+    view: View = False,
+    view_host: ViewHost = "127.0.0.1",
+    view_port: ViewPort = 8765,
+    yes: Yes = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
@@ -50,25 +65,37 @@ def run(
       tcrctl run letter_t
       tcrctl run letter_t --set plant.mismatch=off --seed 7
       tcrctl run my_experiment.yaml --dry-run
+      tcrctl run letter_t --realtime --view
       tcrctl run letter_t --json --out /data/runs | jq .position_error_mm.max
+      tcrctl run letter_t --set plant.kind=rig --set plant.rig=loopback   (see: tcrctl emulate --help)
     """
+    from tcrctl.cli.consent import ask, check_can_ask
     from tcrctl.interruption import signals_exit
     from tcrctl.spec import load_spec
 
     say: Notify = _nothing if quiet else _say
-    with signals_exit():
-        loaded = load_spec(spec, overrides or ())
-        say(_headline(loaded))
-        if not dry_run:
-            _get_ready(out)
-        from tcrctl.experiment import prepare
+    with ExitStack() as viewing:
+        with signals_exit():
+            loaded = load_spec(spec, overrides or ())
+            for note in loaded.notes:
+                say(f"note: {note}")
+            say(_headline(loaded))
+            if not dry_run:
+                if loaded.rig is not None and not yes:
+                    check_can_ask()
+                _get_ready(out)
+            served = _live_view(loaded, view_host, view_port, say) if view and not dry_run else nullcontext()
+            tap = viewing.enter_context(served)
+            from tcrctl.experiment import prepare
 
-        experiment = prepare(loaded, seed=seed, notify=say)
-        path = _planned(experiment, force, say)
-    if dry_run:
-        print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
-        return
-    summary = _run(experiment, out, realtime, say, quiet=quiet)
+            experiment = prepare(loaded, seed=seed, notify=say)
+            path = _planned(experiment, force, say)
+        if dry_run:
+            print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
+            return
+        if loaded.rig is not None and not yes:
+            ask(f"{loaded.robot.name} on rig {loaded.rig.rig.name} will move for {_length(experiment)}.")
+        summary = _run(experiment, out, realtime, say, tap, quiet=quiet)
     if summary.reason:
         print(f"{'error' if summary.exit_code != 3 else summary.status}: {summary.reason}", file=sys.stderr)
     if as_json:
@@ -87,11 +114,31 @@ def _get_ready(out: Path) -> None:
     import tcrctl.run  # noqa: F401  (later a signal shall find it loaded)
 
 
-def _run(experiment: Experiment, out: Path, realtime: bool, say: Notify, *, quiet: bool) -> Summary:
+@contextmanager
+def _live_view(loaded: LoadedSpec, host: str, port: int, say: Notify) -> Iterator[Tap]:
+    """Serve the run to the Foxglove app while it is prepared and while it runs."""
+    from tcrctl.view.live import LiveView
+
+    with LiveView(loaded.spec.name, host=host, port=port) as live:
+        say(f"live view at {live.url}; open {live.app_url}")
+        yield live.tap
+        if live.failure is not None:
+            say(f"warning: the live view ended before the run: {live.failure}")
+
+
+def _run(
+    experiment: Experiment, out: Path, realtime: bool, say: Notify, tap: Tap | None, *, quiet: bool
+) -> Summary:
     from tcrctl.run import run_experiment
 
     with progress_bar(experiment.spec.name, shown=not quiet) as progress:
-        return run_experiment(experiment, out=out, realtime=realtime, notify=say, progress=progress)
+        return run_experiment(
+            experiment, out=out, realtime=realtime, confirmed=True, notify=say, progress=progress, tap=tap
+        )
+
+
+def _length(experiment: Experiment) -> str:
+    return f"{experiment.steps * experiment.period:.0f} s"
 
 
 def _planned(experiment: Experiment, force: bool, say: Notify) -> StaticPath | None:

@@ -26,6 +26,8 @@ def rows(summary: Summary) -> Iterator[Row]:
     if measures.saturated_fraction is not None:
         yield "saturated", f"{100.0 * measures.saturated_fraction:.1f} % of the steps", ""
     yield "control time", _numbers(measures.control_ms, "ms"), ""
+    if measures.latency_ms is not None:
+        yield "camera to drive", _numbers(measures.latency_ms, "ms"), ""
     yield "iterations", _numbers(measures.inner_iterations, ""), ""
     if measures.overruns or measures.unconverged_steps:
         text = f"{measures.overruns} overruns, {measures.unconverged_steps} unconverged steps"

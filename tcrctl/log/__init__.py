@@ -8,10 +8,11 @@ metadata ``tcrctl.run.start``, first   -                            who, when, w
 ``/tcrctl/step``                       ``tcrctl.v1.Step``           one message per step, sequence = k
 ``/tcrctl/event``, ``/log``            ``tcrctl.v1.Event``,         phase changes, limit trips, stops
                                        ``foxglove.Log``
-``/tf``                                ``foxglove.FrameTransforms``  ring frames in the world, <= 20 Hz
+``/tf``                                ``foxglove.FrameTransforms``  rings and wanted end in the world, <= 20 Hz
 ``/tip/measured``, ``/tip/reference``  ``foxglove.PoseInFrame``     end poses, <= 20 Hz
-``/backbone``                          ``foxglove.PosesInFrame``    ring centres with orientation, <= 10 Hz
-``/scene``                             ``foxglove.SceneUpdate``     rings, rods, cables by tension, <= 5 Hz
+``/backbone``                          ``foxglove.PosesInFrame``    ring centres with orientation, <= 20 Hz
+``/scene``                             ``foxglove.SceneUpdate``     rods, springs, cables by tension, <= 5 Hz
+``/scene/static``                      ``foxglove.SceneUpdate``     rings, end axes, wanted path, once
 metadata ``tcrctl.run.stop``, last     -                            status, reason, criteria
 =====================================  ===========================  =========================================
 

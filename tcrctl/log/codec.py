@@ -15,6 +15,7 @@ from tcrctl.signals import (
     ControlInfo,
     Estimate,
     Measurement,
+    RawFrame,
     Reference,
     StepRecord,
     Timing,
@@ -25,6 +26,7 @@ _RECORDS: Final[dict[str, type]] = {
     "Step": StepRecord,
     "Reference": Reference,
     "Measurement": Measurement,
+    "RawFrame": RawFrame,
     "Estimate": Estimate,
     "Command": Command,
     "ControlInfo": ControlInfo,
@@ -39,6 +41,7 @@ _DTYPES: Final[dict[str, np.dtype[Any]]] = {
     "double[]": np.dtype("<f8"),
     "float[]": np.dtype("<f4"),
     "bool[]": np.dtype(np.bool_),
+    "int32[]": np.dtype("<i4"),
 }
 
 Fields: TypeAlias = frozenset[tuple[str, str]]

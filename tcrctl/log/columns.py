@@ -3,8 +3,8 @@
 ``estimate.position`` of :class:`tcrctl.signals.StepRecord` is column ``estimate_position`` with shape
 (n_steps, 3); ``truth.q`` is ``truth_q``, and so on for every field of every record. Units are those of the
 record, all SI (:data:`COLUMNS`). Where a step has no value (no normal in position-only tracking, fewer
-prediction instants than others, no full state in a lean step) floats are NaN, bools False. Columns of
-``truth`` exist only if a step has it.
+prediction instants than others, no full state in a lean step, no camera frame in time) floats are NaN, integers -1,
+bools False. Columns of ``truth`` (simulated plants) and ``measurement.raw`` (rigs) exist only if a step has them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import inspect
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, is_dataclass
-from operator import attrgetter
 from typing import Any, Final, get_args, get_type_hints
 
 import numpy as np
@@ -67,6 +66,9 @@ def _columns(message: str = "Step", prefix: str = "") -> dict[str, Column]:
 COLUMNS: Final = _columns()
 """Every column by name."""
 
+OPTIONAL: Final = ("truth", "measurement.raw")
+"""Records that a step may lack."""
+
 
 def meanings(record: type = StepRecord, prefix: str = "") -> dict[str, str]:
     """What every column is, by its name: the words of :mod:`tcrctl.signals`; empty where those say nothing."""
@@ -89,6 +91,7 @@ _DTYPES: Final[dict[str, Any]] = {
     "float[]": np.float32,
     "bool": np.bool_,
     "bool[]": np.bool_,
+    "int32[]": np.int32,
     "uint64": np.int64,
     "int64": np.int64,
 }
@@ -112,16 +115,25 @@ def stack(steps: Iterable[StepRecord], names: Collection[str] | None = None) -> 
         if name not in COLUMNS:
             raise UnknownNameError("log column", name, list(COLUMNS))
     values: dict[str, list[Any]] = {name: [] for name in wanted}
-    getters = {name: attrgetter(COLUMNS[name].path) for name in wanted}
+    paths = {name: COLUMNS[name].path.split(".") for name in wanted}
     for step in steps:
-        for name, get in getters.items():
-            absent = step.truth is None and name.startswith("truth_")
-            values[name].append(None if absent else get(step))
+        for name, path in paths.items():
+            values[name].append(_value(step, path))
     return {
         name: _stacked(COLUMNS[name], column)
         for name, column in values.items()
-        if not name.startswith("truth_") or any(value is not None for value in column)
+        if not COLUMNS[name].path.startswith(OPTIONAL) or any(value is not None for value in column)
     }
+
+
+def _value(step: StepRecord, path: list[str]) -> Any:
+    """Value at a path; None if a record on the way is lacking."""
+    value: Any = step
+    for part in path:
+        if value is None:
+            return None
+        value = getattr(value, part)
+    return value
 
 
 def _stacked(column: Column, values: list[Any]) -> NDArray[Any]:
@@ -129,7 +141,8 @@ def _stacked(column: Column, values: list[Any]) -> NDArray[Any]:
         return np.array(values, dtype=np.str_)
     dtype = _DTYPES[column.kind]
     if not column.kind.endswith("[]"):
-        return np.array(values, dtype=dtype)
+        lacking = np.nan if dtype is np.float64 else -1
+        return np.array([lacking if value is None else value for value in values], dtype=dtype)
     missing: NDArray[Any] = np.zeros((0, column.width) if column.width else 0, dtype)
     arrays = [missing if value is None else value for value in values]
     lengths = {len(array) for array in arrays}
@@ -147,7 +160,8 @@ def _longest_empty(column: Column) -> tuple[int, ...]:
 
 def _padded(arrays: list[NDArray[Any]], length: int, least: tuple[int, ...], dtype: Any) -> NDArray[Any]:
     shape = (max(length, least[0]), *least[1:])
-    result = np.full((len(arrays), *shape), False if dtype is np.bool_ else np.nan, dtype)
+    lacking = {np.bool_: False, np.int32: -1}.get(dtype, np.nan)
+    result = np.full((len(arrays), *shape), lacking, dtype)
     for row, array in zip(result, arrays, strict=True):
         row[: len(array)] = array
     return result

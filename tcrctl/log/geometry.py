@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,8 @@ class LogGeometry:
         marker_nodes: Row of the node that each row of ``Measurement.nodes`` measures (n_markers,).
         tip_ring: Module whose ring is the end of eq. (11).
         full_scale_tension: Tension drawn in full red [N]; a slack cable is blue.
+        springs: Node rows of the ends of every spring (n_springs, 2).
+        reference_path: Points on the way that the end shall go (n, 3) [m]; may be empty.
 
     Raises:
         ValueError: If a node row or the tip ring does not exist.
@@ -53,9 +55,12 @@ class LogGeometry:
     marker_nodes: tuple[int, ...]
     tip_ring: int
     full_scale_tension: float = 20.0
+    springs: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    reference_path: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
-        rows = [*self.marker_nodes, *(int(row) for cable in self.cables for row in cable.nodes.ravel())]
+        holes = (row for cable in self.cables for row in cable.nodes.ravel().tolist())
+        rows = [*self.marker_nodes, *holes, *self.springs.ravel().tolist()]
         if any(not 0 <= row < self.n_nodes for row in rows) or not 0 <= self.tip_ring <= self.n_modules:
             raise ValueError(f"geometry names a node or ring beyond module {self.n_modules}")
 

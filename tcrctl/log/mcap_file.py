@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, Final
@@ -34,6 +34,8 @@ TRUNCATED: Final = "truncated"
 LIBRARY: Final = f"tcrctl/{__version__} {LIBRARY_IDENTIFIER}"
 
 Attachments = Mapping[str, tuple[str, bytes]]
+Tap = Callable[[str, int, bytes], None]
+"""Takes topic, log time [Unix ns] and content of every message that is written; must neither wait nor raise."""
 
 
 _CHUNK_BYTES: Final = 2**20
@@ -85,6 +87,7 @@ class McapFile:
         self._schemas: dict[str, int] = {}
         self._channels = self._register(geometry)
         self._events = 0
+        self.tap: Tap | None = None
         self.steps = 0
         self.unflushed = 0
         # Schemas and channels live in the first chunk, and a chunk needs a message: now all of it is on file.
@@ -154,6 +157,8 @@ class McapFile:
     def _add(self, topic: str, log_time: int, data: bytes, sequence: int, publish_time: int) -> None:
         self._chunk += len(data)
         self._writer.add_message(self._channels[topic], log_time, data, publish_time, sequence % 2**32)
+        if self.tap is not None:
+            self.tap(topic, log_time, data)
 
     def flush(self, *, to_disk: bool = False) -> None:
         """End the chunk and hand it to the operating system, and to the disk if ``to_disk``."""

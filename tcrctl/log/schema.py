@@ -33,7 +33,12 @@ SCALARS: Final = {
 }
 #: Not an attribute of a record: another form of what the record holds, written and read by the codec alone.
 OPAQUE: Final = "bytes"
-ARRAYS: Final = {"double[]": _Proto.TYPE_DOUBLE, "float[]": _Proto.TYPE_FLOAT, "bool[]": _Proto.TYPE_BOOL}
+ARRAYS: Final = {
+    "double[]": _Proto.TYPE_DOUBLE,
+    "float[]": _Proto.TYPE_FLOAT,
+    "bool[]": _Proto.TYPE_BOOL,
+    "int32[]": _Proto.TYPE_SFIXED32,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +77,15 @@ MESSAGES: Final[dict[str, tuple[Field, ...]]] = {
         Field("nodes", "float[]", "m", width=3),
         Field("valid", "bool[]"),
         Field("drive", "double[]", "m"),
+        Field("raw", "RawFrame", optional=True),
+    ),
+    "RawFrame": (
+        Field("number", "uint64"),
+        Field("session", "uint64"),
+        Field("delay", "double", "s"),
+        Field("ids", "int32[]"),
+        Field("positions", "float[]", "m", width=3),
+        Field("flags", "int32[]"),
     ),
     "Estimate": (
         Field("t", "double", "s"),

@@ -25,7 +25,7 @@ from typing import BinaryIO, Final, Self
 from tcrctl.errors import LogError
 from tcrctl.log.event import Event
 from tcrctl.log.geometry import LogGeometry
-from tcrctl.log.mcap_file import Attachments, McapFile
+from tcrctl.log.mcap_file import Attachments, McapFile, Tap
 from tcrctl.signals import StepRecord
 
 _QUEUE_S: Final = 2.0  # a writer that lags further behind will not catch up: the disk is too slow
@@ -62,6 +62,7 @@ class LogWriter:
         fsync: bool = False,
         full_state_s: float = 0.0,
         wait_when_full: bool = False,
+        tap: Tap | None = None,
         opener: Callable[[Path], BinaryIO] = open_new,
     ) -> None:
         """Create the log.
@@ -81,6 +82,7 @@ class LogWriter:
                 :mod:`tcrctl.log.schema`.
             wait_when_full: Let :meth:`step` wait for the writer thread from time to time, instead of failing when
                 it lags; for runs that no clock paces.
+            tap: Takes every message when it has been written, in the writer thread; it must neither wait nor raise.
             opener: Opens the file.
 
         Raises:
@@ -92,7 +94,7 @@ class LogWriter:
         self._least, self._turn_steps = 1, 0
         if wait_when_full:  # on a slow machine too a chunk shall be worth compressing
             self._least = max(1, math.ceil(flush_s / period_s - 1e-9))
-            self._turn_steps = max(1, min(_TURN_STEPS, flush_steps // 2, self._least // 2))
+            self._turn_steps = max(1, min(_TURN_STEPS, flush_steps // 2))
         self._limit = max(_QUEUE_MIN_STEPS, math.ceil(_QUEUE_S / period_s))
         self._queue: SimpleQueue[StepRecord | Event | dict[str, str]] = SimpleQueue()
         self._turn, self._written = threading.Event(), threading.Event()
@@ -115,6 +117,7 @@ class LogWriter:
                 self._stream.close()
             self.path.unlink(missing_ok=True)
             raise LogError(self.path, f"cannot be written: {error}") from error
+        self._file.tap = tap
         self._thread = threading.Thread(target=self._run, name="tcrctl-log", daemon=False)
         self._thread.start()
 

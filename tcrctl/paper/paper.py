@@ -73,8 +73,10 @@ class Report:
         )
         left = f", {idle} not run" if idle else ""
         notes = [
-            f"{met} of {len(verdicts)} bars met{left}; {goals} goals met too. Made by `tcrctl paper` in "
-            f"{self.seconds:.0f} s with {self.workers} processes."
+            f"{met} of {len(verdicts)} bars met{left}; {goals} goals met too."
+            if verdicts
+            else "No bars here.",
+            f"Made by `tcrctl paper` in {self.seconds:.0f} s with {self.workers} processes.",
         ]
         if self.load > BUSY * self.cores:
             busy = f"load {self.load:.1f} on {self.cores} cores"

@@ -33,12 +33,14 @@ class Done:
         result: The object that it printed; empty if it printed none.
         reason: Why there is nothing to be measured; empty if there is.
         seconds: Wall time [s].
+        code: Exit code, as in :mod:`tcrctl.errors`.
     """
 
     job: Job
     result: Mapping[str, Any]
     reason: str
     seconds: float
+    code: int = 0
 
 
 class Processes:
@@ -113,7 +115,7 @@ class Processes:
             return
         result = _object(printed)
         reason = late or _failure(child.returncode, result, said)
-        ended(Done(job, result, reason, time.monotonic() - begin))
+        ended(Done(job, result, reason, time.monotonic() - begin, child.returncode))
 
     def _stop(self) -> None:
         """Ask every live process to stop, then make it."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from tcrctl.errors import StoppedError
 from tcrctl.paper.job import Job
 from tcrctl.paper.processes import Done
 from tcrctl.paper.row import Row, Verdict
@@ -67,7 +68,7 @@ class Line:
 def make_line(row: Row, done: Mapping[Job, Done]) -> Line:
     """Measure a row by what became of its jobs; some may not have been run."""
     missing = [job for job in row.jobs if job not in done]
-    failed = [done[job] for job in row.jobs if job in done and done[job].reason]
+    failed = [done[job] for job in row.jobs if job in done and _is_failure(row, done[job])]
     logs = tuple(
         str(done[job].result["log"]) for job in row.jobs if job in done and "log" in done[job].result
     )
@@ -85,6 +86,11 @@ def make_line(row: Row, done: Mapping[Job, Done]) -> Line:
     return Line(row, value, verdict, "", row.text(results) if row.text else f"{value:.3g}", logs)
 
 
+def _is_failure(row: Row, item: Done) -> bool:
+    stopped = item.code == StoppedError.exit_code and bool(item.result)
+    return bool(item.reason) and not (row.may_stop and stopped)
+
+
 def markdown(lines: Sequence[Line], notes: Sequence[str]) -> str:
     """Return the table as Markdown.
 
@@ -94,7 +100,7 @@ def markdown(lines: Sequence[Line], notes: Sequence[str]) -> str:
     """
     rows = [TITLES, ("---",) * len(TITLES), *(line.cells() for line in lines)]
     table = "\n".join("| " + " | ".join(_escaped(cell) for cell in row) + " |" for row in rows)
-    return f"{table}\n\n{chr(10).join(notes)}\n"
+    return f"{table}\n\n{' '.join(notes)}\n"
 
 
 def _escaped(cell: str) -> str:

@@ -29,6 +29,7 @@ class Row:
         value: Number from the results of all jobs in order; None if they do not have it.
         at_least: Bar and goal are lower limits, not upper ones.
         text: More than the number says, from the results; may be left out.
+        may_stop: A run that is stopped by a limit is a result, not a failure.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Row:
     value: Callable[[Sequence[Result]], float | None]
     at_least: bool = False
     text: Callable[[Sequence[Result]], str] | None = None
+    may_stop: bool = False
 
     def reached(self, value: float, limit: float) -> bool:
         """Tell whether a value is as good as a limit."""

@@ -6,7 +6,7 @@ higher, with noisy and late measurements. Runs whose computing time counts have 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from tcrctl.paper.job import Check, Run
@@ -27,11 +27,21 @@ FAST_SCAN: Final = Run(
 )  # fmt: skip
 POLYLINE: Final = Run("box_polyline")
 DYNAMIC: Final = {total_s: Run(f"dynamic_{total_s}s", alone=True) for total_s in (10, 45, 90)}
+STATIC: Final = {
+    total_s: Run(f"dynamic_{total_s}s", ("controller.model=static",)) for total_s in (10, 45, 90)
+}
+KINEMATIC: Final = Run("fixed_point_rotation", ("controller={kind: kinematic, output: pose}",))
+LITERAL: Final = Run(
+    "letter_t",
+    ("controller.prediction=literal", "controller.horizon_s=0.05", "controller.tension=off",
+     "controller.integral=off"),
+)  # fmt: skip
 TWO_SEGMENTS: Final = (FIXED, CONE, HELIX, *DYNAMIC.values(), LASER, SCAN)
 
 POSITION: Final = worst("position_error_mm.max")
 THETA: Final = worst("theta_x_error_rad.max", "theta_y_error_rad.max")
 X_RMSE: Final = worst("x_error_mm.rms")
+X_MAX: Final = worst("x_error_mm.max")
 
 
 def inspection(results: Sequence[Result]) -> str:
@@ -39,6 +49,19 @@ def inspection(results: Sequence[Result]) -> str:
     (task,) = (result["task"] for result in results)
     touched = f"collision at {task['collision_s']:.3g} s" if task["collision"] else "no collision"
     return f"{task['detected']} of {len(task['objects'])}, {touched}"
+
+
+def ending(name: str) -> Callable[[Sequence[Result]], str]:
+    """Return what tells a value of a run, or when a limit stopped it."""
+
+    def tell(results: Sequence[Result]) -> str:
+        (result,) = results
+        (value,) = found(result, name)
+        if result["status"] == "aborted":
+            return f"stopped at {result['duration_s']:.3g} s with {value:.3g}"
+        return f"{value:.3g}"
+
+    return tell
 
 
 def beams(results: Sequence[Result]) -> str:
@@ -60,6 +83,17 @@ ROWS: Final = (
     Row("dynamic_10s", "turn in 10 s, RMSE in x", "2.56", "mm", 1.0, 0.3, (DYNAMIC[10],), X_RMSE),
     Row("dynamic_45s", "turn in 45 s, RMSE in x", "0.16", "mm", 0.16, 0.05, (DYNAMIC[45],), X_RMSE),
     Row("dynamic_90s", "turn in 90 s, RMSE in x", "0.07", "mm", 0.07, 0.03, (DYNAMIC[90],), X_RMSE),
+    Row("dynamic_10s_max", "turn in 10 s, x error", "10.15", "mm", None, None, (DYNAMIC[10],), X_MAX),
+    Row("static_10s", "turn in 10 s with a static model, x error", "diverges", "mm", None, None, (STATIC[10],),
+        X_MAX, text=ending("x_error_mm.max"), may_stop=True),
+    Row("static_45s", "turn in 45 s with a static model, x error", "diverges", "mm", None, None, (STATIC[45],),
+        X_MAX, text=ending("x_error_mm.max"), may_stop=True),
+    Row("static_90s", "turn in 90 s with a static model, x error", "9.43", "mm", None, None, (STATIC[90],),
+        X_MAX, text=ending("x_error_mm.max"), may_stop=True),
+    Row("kinematic", "fixed-point rotation by resolved rates, position error", "-", "mm", None, None,
+        (KINEMATIC,), POSITION, text=ending("position_error_mm.max"), may_stop=True),
+    Row("literal", "letter T, the algorithm as printed, position error", "8.57 (bench)", "mm", None, None,
+        (LITERAL,), POSITION, text=ending("position_error_mm.max"), may_stop=True),
     Row("laser_pipe", "laser, position error at the targets", "8.7, 13.9", "mm", 2.0, 0.5, (LASER,),
         worst("task.targets.position_error_mm")),
     Row("laser_beam", "laser, beams through their pipes", "2 of 2", "", 2, 2, (LASER,),

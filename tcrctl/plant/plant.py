@@ -25,3 +25,16 @@ class Plant(Protocol):
     def close(self) -> None:
         """Leave the robot in a safe state."""
         ...
+
+
+class RunnablePlant(Plant, Protocol):
+    """A plant of a run: what is not recorded has to be got ready."""
+
+    def start(self) -> None:
+        """Get ready to be driven: a rig arms its drives, a simulation has nothing to do.
+
+        Raises:
+            StoppedError: If it must not be driven now.
+            DeviceError: If it cannot.
+        """
+        ...

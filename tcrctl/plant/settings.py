@@ -85,12 +85,23 @@ class SimulatedSettings(Settings):
     dropouts: tuple[DropoutSettings, ...] = Field(default=(), description="markers that are not seen")
 
 
-PlantSettings: TypeAlias = SimulatedSettings
+class RigSettings(Settings):
+    """The real robot, measured by cameras and moved by drives; always paced by the clock."""
+
+    kind: Literal["rig"]
+    rig: str = Field(description="shipped rig, or path of a rig file relative to this one", min_length=1)
+
+
+PlantSettings: TypeAlias = Annotated[
+    SimulatedSettings | RigSettings, Field(discriminator="kind", description="what is controlled")
+]
 """Union of all kinds of plant, told apart by ``kind``."""
 
 
 def rings_named(settings: PlantSettings) -> Iterator[tuple[Path, int]]:
     """Yield path within the section and number of every ring that the settings name."""
+    if not isinstance(settings, SimulatedSettings):
+        return
     if settings.measured_rings != "all":
         for i, ring in enumerate(settings.measured_rings):
             yield ("measured_rings", i), ring

@@ -72,6 +72,9 @@ class SimulatedPlant:
             [self._state.q.copy()], maxlen=whole + 1
         )  # oldest first: shapes as cameras saw them
 
+    def start(self) -> None:
+        """Nothing to arm in simulation."""
+
     def read(self) -> Measurement:
         """Ring nodes as they were one latency ago, with noise, in single precision; drives as they are."""
         nodes = self._seen[0].reshape(-1, 3)[self._rows]

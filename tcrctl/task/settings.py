@@ -16,6 +16,13 @@ from tcrctl.trajectory.values import NotNegative, Positive, Vector, not_empty
 #: How far markers may lie off the symmetry that the pose is computed from [mm].
 SYMMETRY_MM: Final = 1.0
 
+#: Names of what is found for every target, and for a box as a whole; numbers and flags only.
+TARGET_RESULTS: Final = (
+    "position_error_mm", "theta_x_error_rad", "theta_y_error_rad", "beam_passes", "bore_clearance_mm",
+    "spot_offset_mm", "dwell_s",
+)  # fmt: skip
+BOX_RESULTS: Final = ("detected", "detection_s", "collision", "collision_s", "smallest_clearance_mm")
+
 Label: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 Wall: TypeAlias = Literal["left", "right", "front", "back", "bottom", "top"]
 #: Axis of the box that each wall is across, and on which side of the inside the wall is.
@@ -41,6 +48,21 @@ def _three_or_more(markers: tuple[Vector, ...]) -> tuple[Vector, ...]:
             f"marker {worst + 1} is {around[worst]:.4g} mm from the centre of all, {others}; they must be spread "
             "evenly around the axis"
         )
+    if usual < SYMMETRY_MM:
+        raise ValueError("the markers are all in one place")
+    return markers
+
+
+def _in_order(markers: tuple[Vector, Vector, Vector, Vector]) -> tuple[Vector, Vector, Vector, Vector]:
+    _three_or_more(markers)
+    across = 2.0 * median(math.dist(marker, _middle(markers)) for marker in markers)
+    for i in (0, 1):
+        found = math.dist(markers[i], markers[i + 2])
+        if abs(found - across) > 2.0 * SYMMETRY_MM:
+            raise ValueError(
+                f"markers {i + 1} and {i + 3} must face each other across the middle, {across:.4g} mm apart; they "
+                f"are {found:.4g} mm apart"
+            )
     return markers
 
 
@@ -97,12 +119,6 @@ class LaserPipeSettings(Settings):
         return tuple(f"targets.{i}.{name}" for i in range(len(self.pipes)) for name in TARGET_RESULTS)
 
 
-TARGET_RESULTS: Final = (
-    "position_error_mm", "theta_x_error_rad", "theta_y_error_rad", "beam_passes", "bore_clearance_mm",
-    "spot_offset_mm", "dwell_s",
-)  # fmt: skip
-
-
 class BoxHoleSettings(Settings):
     """A round hole in a wall of the box."""
 
@@ -122,7 +138,7 @@ class BoxSettings(Settings):
     left and right at the ends of x, front and back at those of y, bottom and top at those of z.
     """
 
-    markers_mm: Annotated[tuple[Vector, Vector, Vector, Vector], AfterValidator(_three_or_more)] = quantity(
+    markers_mm: Annotated[tuple[Vector, Vector, Vector, Vector], AfterValidator(_in_order)] = quantity(
         "mm",
         "markers on the left wall around its middle, world frame, clockwise from top left as seen from outside",
     )
@@ -210,8 +226,6 @@ class BoxInspectionSettings(Settings):
         each = (f"objects.{i}.{n}" for i in range(len(self.objects)) for n in ("detected", "first_seen_s"))
         return (*each, *BOX_RESULTS)
 
-
-BOX_RESULTS: Final = ("detected", "detection_s", "collision", "collision_s", "smallest_clearance_mm")
 
 TaskSettings: TypeAlias = Annotated[LaserPipeSettings | BoxInspectionSettings, Field(discriminator="kind")]
 """Union of all kinds of task, told apart by ``kind``."""

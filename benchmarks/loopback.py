@@ -1,0 +1,74 @@
+"""Experiments on the emulated bench against the same on the simulated plant: errors, and camera-to-drive latency.
+
+    python benchmarks/loopback.py                # letter_t, fixed_point_rotation at 20 and 100 Hz, 8 minutes
+    python benchmarks/loopback.py letter_t 100   # one experiment, one rate
+
+Needs a computer that is not busy: cameras, PLCs, two robots and the controller share it, in real time. On a bench
+the error is that of the estimate, as nobody knows more.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from typing import Any
+
+TCRCTL = [sys.executable, "-m", "tcrctl.cli.app"]
+RIG = ["--set", "plant.kind=rig", "--set", "plant.rig=loopback", "--yes"]
+ERROR_FACTOR, P50_MS, P99_MS = 2.0, 4.0, 20.0
+
+
+def run(name: str, rate: float, out: str, *options: str) -> dict[str, Any]:
+    """Run an experiment; return its result."""
+    period = ["--set", f"controller.period_s={1.0 / rate:g}", "--out", out, "--json", "--quiet"]
+    done = subprocess.run(
+        [*TCRCTL, "run", name, *period, *options], capture_output=True, text=True, check=False
+    )
+    result: dict[str, Any] = json.loads(done.stdout)
+    return {**result, "exit_code": done.returncode}
+
+
+def main(arguments: list[str]) -> int:
+    """Print the table; return how many rows are not as they must be."""
+    names = arguments[:1] or ["letter_t", "fixed_point_rotation"]
+    rates = [float(rate) for rate in arguments[1:]] or [20.0, 100.0]
+    bad = 0
+    print(
+        "| experiment | rate | exit | max error, bench | max error, simulated | latency p50 | p99 | overruns | ok |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as out:
+        emulator = subprocess.Popen([*TCRCTL, "emulate"], stderr=subprocess.PIPE, text=True)
+        try:
+            if emulator.stderr is not None:
+                while "is emulated" not in (line := emulator.stderr.readline()):
+                    print(line, end="", file=sys.stderr)
+            for name in names:
+                for rate in rates:
+                    bench = run(name, rate, out, *RIG)
+                    bad += not _row(name, rate, bench, run(name, rate, out))
+        finally:
+            emulator.terminate()
+            emulator.wait()
+    return bad
+
+
+def _row(name: str, rate: float, bench: dict[str, Any], simulated: dict[str, Any]) -> bool:
+    if bench["exit_code"] or bench["latency_ms"] is None:
+        print(f"| {name} | {rate:g} Hz | {bench['exit_code']} | {bench['reason']} | | | | | **no** |")
+        return False
+    error, wanted = (each["position_error_mm"]["max"] for each in (bench, simulated))
+    p50, p99 = bench["latency_ms"]["p50"], bench["latency_ms"]["p99"]
+    good = error <= ERROR_FACTOR * wanted and p50 <= P50_MS and p99 <= P99_MS
+    print(
+        f"| {name} | {rate:g} Hz | 0 | {error:.2f} mm | {wanted:.2f} mm | {p50:.1f} ms | {p99:.1f} ms "
+        f"| {bench['overruns']} | {'yes' if good else '**no**'} |",
+        flush=True,
+    )
+    return bool(good)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]) > 0)

@@ -1,0 +1,73 @@
+"""``tcrctl plot LOG...``: figures of one run, or of several to compare."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tcrctl.cli.options import AsJson
+
+Logs = Annotated[
+    list[Path], typer.Argument(metavar="LOG...", help="Logs of runs, or the folders of the runs.")
+]
+Figures = Annotated[
+    list[str] | None,
+    typer.Option("--figure", "-f", metavar="NAME", help="Which figure; repeatable. Default: all."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Where files are made; default: plots beside the log, ./plots for several logs.",
+    ),
+]
+Format = Annotated[str, typer.Option("--format", metavar="png|pdf|svg", help="File format.")]
+Labels = Annotated[
+    list[str] | None,
+    typer.Option("--label", metavar="TEXT", help="Name in legends, one per log in the same order."),
+]
+Begin = Annotated[float | None, typer.Option("--from", metavar="SECONDS", help="First time shown.")]
+End = Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="Last time shown.")]
+
+
+def plot(
+    logs: Logs,
+    figures: Figures = None,
+    out: Out = None,
+    file_format: Format = "png",
+    labels: Labels = None,
+    begin: Begin = None,
+    end: End = None,
+    as_json: AsJson = False,
+) -> None:
+    """Draw figures of a run; several logs are overlaid. Files that exist are replaced.
+
+    Figures: overview, path, position, orientation, normal, error, drives, speeds, tensions, timing.
+
+    Examples:
+      tcrctl plot logs/*_letter_t_*/log.mcap
+      tcrctl plot log.mcap --figure path --figure error --format pdf --out figures
+      tcrctl plot static/log.mcap dynamic/log.mcap --label static --label dynamic
+      tcrctl plot log.mcap -f tensions --from 10 --to 20
+    """
+    from tcrctl.history import read_histories
+    from tcrctl.plots import FIGURES, check_names, save_figures
+
+    names = list(dict.fromkeys(figures or FIGURES))
+    check_names(names, file_format)
+    histories = read_histories(logs, labels=labels or (), begin=begin, end=end)
+    beside = histories[0].log.path.parent if len(logs) == 1 else Path()
+    files = []
+    for path in save_figures(histories, names, out or beside / "plots", file_format):
+        files.append(str(path))
+        if not as_json:
+            print(path, flush=True)
+    if as_json:
+        print(json.dumps({"status": "ok", "files": files}))
+    else:
+        print(f"{len(files)} figures", file=sys.stderr)

@@ -1,0 +1,267 @@
+"""The whole bench without a bench: Motive server and PLCs as a rig file describes them, round simulated robots.
+
+    rig file -> one PLC per robot --servo positions--> simulated robots --ring nodes, noise--> Motive server
+                        ^ set-points                                                              | frames
+                        +------------------------------- tcrctl run --------- <-------------------+
+
+The emulators speak the real protocols on real sockets; a run cannot tell them from the devices, apart from
+the numbers.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Final, Self
+
+import numpy as np
+
+from tcr_hardware.emulators.motive import MotiveEmulator
+from tcr_hardware.emulators.motive_settings import MotiveSettings
+from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
+from tcr_hardware.emulators.plc_program import PlcLimitSettings
+from tcr_hardware.errors import HardwareError
+from tcr_hardware.rigid_transform import RigidTransform
+from tcrctl.emulate.fault_script import FaultScript, Player
+from tcrctl.emulate.robot import EmulatedRobot
+from tcrctl.errors import DeviceError, InputError
+from tcrctl.plant.natnet_cameras import transform
+from tcrctl.plant.rig_settings import CableDrive, ModbusTcp, MountedRobot, RigFile
+from tcrctl.plant.settings import Mismatch
+from tcrctl.robot.description import load_robot
+from tcrctl.robot.robot import Robot, build_robot
+from tcrctl.signals import Array
+
+#: The PLC's limits are wider than the soft limits of the rig file by this [um].
+MARGIN: Final = 5000
+#: That of the shipped experiments.
+SHIPPED_MISMATCH: Final = Mismatch(springs_youngs_modulus=0.7, density=1.2)
+#: How often the fault script looks at the time, and the main thread at the signals [s].
+TICK: Final = 0.005
+
+
+@dataclass(frozen=True, slots=True)
+class EmulationSettings:
+    """How the emulated bench differs from a perfect one.
+
+    Attributes:
+        mismatch: By what the robots differ from the controller's model; None for not at all.
+        noise: Standard deviation of every marker coordinate [m].
+        rate: Camera frames per second [Hz].
+        version: Newest NatNet version of the server.
+        watchdog_ms: Watchdog of the PLCs [ms].
+        seed: Seed of everything random.
+        unicast_to: Where frames go in unicast: ``sender`` of the request or the ``data_port``.
+    """
+
+    mismatch: Mismatch | None = SHIPPED_MISMATCH
+    noise: float = 50e-6
+    rate: float = 240.0
+    version: str = "4.1"
+    watchdog_ms: int = 200
+    seed: int = 0
+    unicast_to: str = "sender"
+
+
+class EmulatedBench:
+    """Emulators of one rig file; a context manager.
+
+    Attributes:
+        motive: The camera system.
+        plcs: The PLC of every robot.
+        robots: The simulated robots.
+    """
+
+    def __init__(
+        self, rig: RigFile, settings: EmulationSettings, robots: dict[str, Robot] | None = None
+    ) -> None:
+        """Build everything; nothing is opened yet.
+
+        Args:
+            rig: The bench.
+            settings: Its imperfections.
+            robots: Robots by name where they are built already.
+
+        Raises:
+            InputError: If the rig file cannot be emulated.
+            DeviceError: If the port of the cameras is taken.
+        """
+        self._rig, self._settings, built = rig, settings, robots or {}
+        self._random = np.random.default_rng(settings.seed)
+        self._failure: Exception | None = None
+        self.plcs: dict[str, PlcEmulator] = {}
+        self.robots: dict[str, EmulatedRobot] = {}
+        self._back: dict[str, RigidTransform] = {}
+        names: list[str] = []
+        for name, mounted in rig.robots.items():
+            robot = built[name] if name in built else build_robot(load_robot(name))
+            self.plcs[name] = PlcEmulator(_plc_settings(mounted, settings))
+            self.robots[name] = self._moved(name, mounted, robot)
+            self._back[name] = transform(mounted.calibration)
+            names += _labels(mounted, robot)
+        try:
+            self.motive = MotiveEmulator(names, self._markers, _motive_settings(rig, settings))
+        except OSError as error:
+            where = f"{rig.cameras.server}:{rig.cameras.command_port}"
+            hint = "Is another tcrctl emulate running?"
+            raise DeviceError(
+                f"cameras cannot be emulated at {where}: {error.strerror}", hint=hint
+            ) from error
+        self._opened = ExitStack()
+
+    def _moved(self, name: str, mounted: MountedRobot, robot: Robot) -> EmulatedRobot:
+        plc = self.plcs[name]
+        cables = [mounted.cables[cable] for cable in robot.cable_names]
+        axes = len(plc.positions_um())
+
+        def drives() -> list[float]:
+            positions = plc.positions_um()
+            return [1e-6 * cable.sign * positions[cable.axis - 1] for cable in cables]
+
+        def tensions(newtons: Any) -> None:
+            felt = [0.0] * axes
+            for cable, newton in zip(cables, newtons, strict=True):
+                felt[cable.axis - 1] = newton
+            plc.set_tensions(felt)
+
+        return EmulatedRobot(robot, self._settings.mismatch, drives, tensions)
+
+    def _markers(self) -> Array:
+        """All markers in the frame of the cameras (n, 3) [m]."""
+        try:
+            seen = [self._back[name].inverse_apply(robot.rings()) for name, robot in self.robots.items()]
+            exact = np.concatenate(seen)
+        except Exception as error:
+            self._failure = error
+            raise
+        return np.asarray(exact + self._settings.noise * self._random.standard_normal(exact.shape))
+
+    def __enter__(self) -> Self:
+        """Open all ports.
+
+        Raises:
+            DeviceError: If a port is taken.
+        """
+        try:
+            for name, plc in self.plcs.items():
+                plc.start(tcp=_address(self._rig.robots[name]))
+                self._opened.callback(plc.stop)
+            self.motive.start()
+            self._opened.callback(self.motive.stop)
+        except (HardwareError, OSError) as error:
+            self._opened.close()
+            raise DeviceError(
+                f"the bench cannot be emulated: {error}", hint=getattr(error, "hint", "")
+            ) from error
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close them."""
+        self._opened.close()
+
+    def check(self) -> None:
+        """Do nothing, unless a simulation broke down.
+
+        Raises:
+            DivergenceError: If one did.
+        """
+        if self._failure is not None:
+            raise self._failure
+
+    def as_json(self) -> dict[str, Any]:
+        """What the bench is doing, for ``tcrctl emulate --json``."""
+        return {
+            "rig": self._rig.name,
+            "cameras": {"frames": self.motive.frames_sent, "clients": self.motive.clients},
+            "robots": {
+                name: {
+                    "positions_mm": [round(1e-3 * um, 4) for um in self.plcs[name].positions_um()],
+                    "status": str(self.plcs[name].snapshot()["status"]),
+                    "slipped_s": round(robot.slipped, 3),
+                }
+                for name, robot in self.robots.items()
+            },
+        }
+
+
+def emulate(
+    bench: EmulatedBench,
+    script: FaultScript | None,
+    stop: Callable[[], bool],
+    notify: Callable[[str], None],
+) -> None:
+    """Keep an opened bench going until it shall stop, and let its faults happen.
+
+    Args:
+        bench: The bench.
+        script: What shall go wrong and when.
+        stop: Whether to stop.
+        notify: Takes what happens, for people.
+
+    Raises:
+        DivergenceError: If a simulation broke down.
+    """
+    player = Player(script, bench.motive, bench.plcs, notify) if script else None
+    begun = time.monotonic()
+    while not stop():
+        if player is not None:
+            player.play(time.monotonic() - begun)
+        bench.check()
+        time.sleep(TICK)
+
+
+def _address(mounted: MountedRobot) -> tuple[str, int]:
+    plc = mounted.plc
+    if not isinstance(plc, ModbusTcp):
+        raise InputError(
+            "only PLCs on Modbus TCP are emulated from a rig file", hint="Use plc.kind: modbus_tcp."
+        )
+    return plc.host, plc.port
+
+
+def _labels(mounted: MountedRobot, robot: Robot) -> list[str]:
+    """Names of all markers of a robot: base ring, then ring by ring."""
+    markers = mounted.markers
+    if markers.labels is None:
+        raise InputError("markers.labels is needed to emulate a rig; markers.nodes alone is not enough")
+    base = [markers.base.format(node=node) for node in (1, 2, 3)]
+    rings = range(1, robot.n_modules + 1)
+    return base + [markers.labels.format(ring=ring, node=node) for ring in rings for node in (1, 2, 3)]
+
+
+def _plc_settings(mounted: MountedRobot, settings: EmulationSettings) -> PlcSettings:
+    ranges = [_axis_range(cable) for cable in mounted.cables.values()]
+    return PlcSettings(
+        axes=max(6, *(cable.axis for cable in mounted.cables.values())),
+        unit=mounted.plc.unit,
+        limits=PlcLimitSettings(
+            min_um=min(low for low, _ in ranges) - MARGIN,
+            max_um=max(high for _, high in ranges) + MARGIN,
+            watchdog_ms=settings.watchdog_ms,
+        ),
+    )
+
+
+def _axis_range(cable: CableDrive) -> tuple[int, int]:
+    ends = round(1e3 * cable.sign * cable.min_mm), round(1e3 * cable.sign * cable.max_mm)
+    return min(ends), max(ends)
+
+
+def _motive_settings(rig: RigFile, settings: EmulationSettings) -> MotiveSettings:
+    cameras = rig.cameras
+    return MotiveSettings(
+        host=cameras.server,
+        command_port=cameras.command_port,
+        data_port=cameras.data_port or 1511,
+        multicast=cameras.transport == "multicast",
+        group=cameras.multicast_group or MotiveSettings().group,
+        unicast_to=settings.unicast_to,
+        version=settings.version,
+        rate_hz=settings.rate,
+        seed=settings.seed,
+    )

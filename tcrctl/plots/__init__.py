@@ -1,0 +1,103 @@
+"""Figures of a run, one kind one file: each takes histories and returns a figure.
+
+=============  ===================================================================  =====================
+name           shows                                                                like [TCR]
+=============  ===================================================================  =====================
+overview       robot, path of its end, projection of the path, error                Fig. 10
+path           path of the end in space, with arrows along the end axis             Fig. 11 (b), 19 (a)
+position       x, y, z over time, wanted and actual                                 Fig. 9 (b), 16
+orientation    theta_x, theta_y over time, wanted and actual                        Fig. 12, 16
+normal         components of the end normal over time, wanted and actual            Fig. 25 (b)
+error          position and orientation error over time                             Fig. 9 (d), 10 (b)
+drives         drive lengths over time                                              Fig. 9 (c), 11 (c)
+speeds         drive speeds over time, limits, saturation                           -
+tensions       cable tensions over time, limits                                     -
+timing         time that a control step takes                                       -
+=============  ===================================================================  =====================
+
+The modules here import matplotlib; this one does so only when a figure is drawn.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from tcrctl.errors import DeviceError, UnknownNameError
+from tcrctl.history import History
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FIGURES: Final = (
+    "overview", "path", "position", "orientation", "normal", "error", "drives", "speeds", "tensions", "timing",
+)  # fmt: skip
+"""Every kind of figure: the name of its module."""
+
+FORMATS: Final = ("png", "pdf", "svg")
+
+
+def draw(name: str, histories: Sequence[History]) -> Figure:
+    """Draw a figure.
+
+    Args:
+        name: One of ``FIGURES``.
+        histories: One run, or several to compare.
+
+    Raises:
+        UnknownNameError: If there is no such kind of figure.
+    """
+    check_names([name], FORMATS[0])
+    from tcrctl.plots.style import printed
+
+    module = importlib.import_module(f"tcrctl.plots.{name}")
+    with printed():
+        figure: Figure = module.draw(histories)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure in the format of the file's suffix; an existing file is replaced.
+
+    Raises:
+        DeviceError: If the file cannot be written.
+    """
+    from tcrctl.plots.style import printed
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with printed():
+            figure.savefig(path)
+    except OSError as error:
+        raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def check_names(names: Sequence[str], file_format: str) -> None:
+    """Find out before anything is read whether all figures and the format exist.
+
+    Raises:
+        UnknownNameError: If one does not.
+    """
+    for name in names:
+        if name not in FIGURES:
+            raise UnknownNameError("figure", name, FIGURES)
+    if file_format not in FORMATS:
+        raise UnknownNameError("file format", file_format, FORMATS)
+
+
+def save_figures(
+    histories: Sequence[History], names: Sequence[str], out: Path, file_format: str
+) -> Iterator[Path]:
+    """Draw figures and write each to ``out/NAME.FORMAT``; yield every file when it is there.
+
+    Raises:
+        UnknownNameError: If there is no such figure or format; nothing is written then.
+        DeviceError: If a file cannot be written.
+    """
+    check_names(names, file_format)
+    for name in names:
+        path = out / f"{name}.{file_format}"
+        save(draw(name, histories), path)
+        yield path

@@ -1,0 +1,80 @@
+"""One picture of a run: robot, path of its end, the path as a drawing, error; Fig. 10 of [TCR]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tcrctl.history import History
+from tcrctl.plots import style
+from tcrctl.plots.space import draw_body, equal_scale
+from tcrctl.signals import Array
+from tcrctl.skeleton import read_skeleton
+
+_VIEWS: Final = {(0, 1): "from above", (0, 2): "from the front", (1, 2): "from the side"}
+
+
+#: A path no larger than this is a point.
+_POINT_MM: Final = 1.0
+
+
+def draw(histories: Sequence[History]) -> Figure:
+    """Draw the robot of the first run in the middle of it, the paths of all runs [mm], and their errors."""
+    figure = style.new_figure(3.7)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 2.2), height_ratios=(2.2, 1.0))
+    _body(figure.add_subplot(grid[:, 0], projection="3d"), histories)
+    drawing, below = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
+    _drawing(drawing, histories)
+    for i, history in enumerate(histories):
+        below.plot(history.t, 1e3 * history.position_error, **style.line(i))
+    below.set(xlabel="t [s]", ylabel="error [mm]", ylim=(0.0, None))
+    style.span([below], histories)
+    style.legend(figure, [drawing])
+    return figure
+
+
+def _body(axes: Any, histories: Sequence[History]) -> None:
+    paths = [1e3 * history.position for history in histories]
+    shown = list(paths)
+    shape = histories[0].shape
+    if len(shape):
+        nodes = 1e3 * shape[len(shape) // 3]
+        draw_body(axes, nodes, read_skeleton(histories[0].log, len(nodes)))
+        shown.append(nodes)
+    for i, path in enumerate(paths):
+        axes.plot(*path.T, **style.line(i))
+    equal_scale(axes, shown, 10.0, zoom=1.2)
+    axes.set(xticks=[], yticks=[], xlabel="x", ylabel="y", zlabel="z [mm]")
+    axes.xaxis.labelpad, axes.yaxis.labelpad, axes.zaxis.labelpad = -12, -12, 12
+    for artist in axes.lines:  # the box is larger than its place
+        artist.set_clip_on(False)
+        artist.set_in_layout(False)
+
+
+def _drawing(panel: Axes, histories: Sequence[History]) -> None:
+    a, b = _plane([history.wanted_position for history in histories])
+    wanted = 1e3 * histories[0].wanted_position
+    thick: dict[str, Any] = (
+        {"lw": 4.0} if np.ptp(wanted, axis=0).max() > _POINT_MM else {"ls": "", "marker": "P", "ms": 9}
+    )
+    panel.plot(wanted[:, a], wanted[:, b], color="#bbbbbb", **thick, label="wanted")
+    for i, history in enumerate(histories):
+        name = "end of the robot" if len(histories) == 1 else history.label
+        path = 1e3 * history.position
+        panel.plot(path[:, a], path[:, b], **style.line(i), label=name)
+    panel.set_title(_VIEWS[a, b], loc="left")
+    panel.set(xlabel=f"{'xyz'[a]} [mm]", ylabel=f"{'xyz'[b]} [mm]")
+    panel.set_aspect("equal", adjustable="datalim")
+
+
+def _plane(paths: Sequence[Array]) -> tuple[int, int]:
+    """Axes of the projection in which the path is largest; from above if it hardly moves."""
+    extent = np.ptp(np.concatenate(paths), axis=0)
+    if np.max(extent) < 1e-3 * _POINT_MM:
+        return 0, 1
+    a, b = sorted(np.argsort(-extent, kind="stable")[:2].tolist())
+    return a, b

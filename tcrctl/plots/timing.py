@@ -1,0 +1,56 @@
+"""Time that a control step takes: over the run, and how often."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tcrctl.history import History
+from tcrctl.plots import style
+from tcrctl.signals import Array
+
+_BINS: Final = 60
+
+
+def draw(histories: Sequence[History]) -> Figure:
+    """Draw the time of estimator and controller [ms], its distribution, and the lateness of paced runs."""
+    paced = [history for history in histories if np.any(history.lateness > 0.0)]
+    figure = style.new_figure(2.9 + 1.9 * bool(paced))
+    rows = figure.subplots(1 + bool(paced), 2, width_ratios=(2.2, 1.0), squeeze=False)
+    compute = [1e3 * h.compute for h in histories]
+    _row(rows[0], histories, compute, "control time [ms]")
+    period = 1e3 * float(np.median(histories[0].period))
+    rows[0][1].set_title(f"period {period:g} ms", loc="right", fontsize=7)
+    if paced:
+        _row(rows[1], paced, [1e3 * h.lateness for h in paced], "lateness [ms]")
+    rows[-1][0].set_xlabel("t [s]")
+    rows[-1][1].set_xlabel("steps")
+    return figure
+
+
+def _row(row: Sequence[Axes], histories: Sequence[History], values: Sequence[Array], name: str) -> None:
+    over_time, spread = row
+    top = max(float(np.nanmax(v)) for v in values)
+    edges = np.linspace(0.0, top or 1.0, _BINS + 1).tolist()
+    for i, (history, found) in enumerate(zip(histories, values, strict=True)):
+        median, high = np.nanquantile(found, [0.5, 0.99])
+        prefix = "" if len(histories) == 1 else f"{history.label}: "
+        label = f"{prefix}p50 {median:.3g}, p99 {high:.3g}, max {np.nanmax(found):.3g} ms"
+        style_i = style.line(i)
+        over_time.plot(history.t, found, lw=0.7, color=style_i["color"], label=label)
+        spread.hist(
+            found,
+            edges,
+            orientation="horizontal",
+            histtype="step",
+            color=style_i["color"],
+            ls=style_i["linestyle"],
+        )
+    over_time.set(ylabel=name, ylim=(0.0, 1.08 * (top or 1.0)))
+    style.span([over_time], histories)
+    over_time.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1)
+    spread.set(ylim=over_time.get_ylim(), xscale="log")

@@ -1,0 +1,1 @@
+"""Work on a rig beside experiments: check, status, calibrate, zero, jog, reset; one verb one file."""

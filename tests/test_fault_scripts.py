@@ -1,0 +1,113 @@
+"""Fault scripts: checked before anything starts, and played at the times they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcr_hardware.emulators.motive import MotiveEmulator, MotiveSettings
+from tcr_hardware.emulators.plc import PlcEmulator
+from tcr_hardware.emulators.plc_faults import FAULTS
+from tcrctl.emulate.fault_script import CAMERA_FAULTS, Player, load_fault_script
+from tcrctl.errors import SpecError
+
+
+def script(tmp_path, *lines):
+    path = tmp_path / "faults.yaml"
+    path.write_text("faults:\n" + "".join(f"  - {line}\n" for line in lines))
+    return load_fault_script(path)
+
+
+WRONG = {
+    "neither": ("{at_s: 1}", "either cameras or plc"),
+    "both": ("{at_s: 1, plc: estop, cameras: restart}", "either cameras or plc"),
+    "unknown camera fault": ("{at_s: 1, cameras: {los: 0.1}}", "no such fault; known: loss"),
+    "unknown plc fault": ("{at_s: 1, plc: estopp}", "no fault estopp; known: exception"),
+    "unknown argument": ("{at_s: 1, plc: jam, with: {axle: 2}}", "jam has no such argument; known: axis"),
+    "not a share": ("{at_s: 1, cameras: {loss: much}}", "must be a number"),
+    "not a switch": ("{at_s: 1, cameras: {freeze: 1}}", "must be true or false"),
+    "not names": ("{at_s: 1, cameras: {nan: 3}}", "must be a list of marker names"),
+    "not pairs": ("{at_s: 1, cameras: {swap: [a, b]}}", "must be a list of pairs"),
+    "not a version": ("{at_s: 1, cameras: {version: 4.1}}", "must be a version such as '3.1'"),
+    "before the start": ("{at_s: -1, plc: estop}", "must be >= 0"),
+    "unknown event": ("{at_s: 1, after: lunch, plc: estop}", "after"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_mistake_is_found_before_anything_starts(name, tmp_path):
+    line, message = WRONG[name]
+    with pytest.raises(SpecError) as caught:
+        script(tmp_path, line)
+    assert message in str(caught.value)
+    assert "faults.yaml:2:" in str(caught.value)
+
+
+@pytest.fixture
+def bench():
+    plc = PlcEmulator()
+    plc.positions_um = lambda: plc.where
+    plc.where = (0.0,) * 6
+    motive = MotiveEmulator(["a.1", "a.2"], lambda: np.zeros((2, 3)), MotiveSettings(command_port=0))
+    yield motive, plc
+    motive.stop()
+
+
+def test_faults_come_and_go_at_their_times(tmp_path, bench):
+    motive, plc = bench
+    said = []
+    made = script(
+        tmp_path,
+        "{at_s: 1, cameras: {loss: 0.5, nan: [a.1], swap: [[a.1, a.2]], offset_m: [0.1, 0, 0]}, for_s: 2}",
+        "{at_s: 2, plc: jam, with: {axis: 3}, for_s: 1}",
+        "{at_s: 0.5, after: moving, plc: silence}",
+    )
+    player = Player(made, motive, {"tcr600": plc}, said.append)
+    seen = {}
+    for now in np.arange(0.0, 6.0, 0.25):
+        plc.where = (0.0 if now < 4.0 else 100.0,) * 6
+        player.play(float(now))
+        seen[float(now)] = (motive.faults.loss, dict(plc.faults.active))
+    assert [now for now, (loss, _) in seen.items() if loss] == [1.0 + 0.25 * i for i in range(8)]
+    assert [now for now, (_, active) in seen.items() if "jam" in active] == [2.0, 2.25, 2.5, 2.75]
+    assert seen[2.0][1]["jam"]["axis"] == 3
+    assert [now for now, (_, active) in seen.items() if "silence" in active] == [
+        4.5 + 0.25 * i for i in range(6)
+    ]
+    assert (motive.faults.nan, motive.faults.swap, motive.faults.offset_m) == (
+        frozenset(),
+        (),
+        (0.0, 0.0, 0.0),
+    )
+    assert sum("fault:" in text for text in said) == 3
+
+
+def test_a_fault_of_one_robot_leaves_the_others_alone(tmp_path, bench):
+    motive, plc = bench
+    other = PlcEmulator()
+    made = script(tmp_path, "{at_s: 0, plc: estop, robot: tcr700}")
+    Player(made, motive, {"tcr600": plc, "tcr700": other}, lambda text: None).play(0.0)
+    assert (list(plc.faults.active), list(other.faults.active)) == ([], ["estop"])
+
+
+def test_every_fault_of_the_emulators_can_be_asked_for(tmp_path):
+    names = "[a.1]"
+    values = {
+        **{"occluded": names, "missing": names, "nan": names, "swap": "[[a.1, a.2]]"},
+        **{"offset_m": "[0, 0, 1]", "reorder": "2", "version": "'3.1'", "renamed": "true"},
+    }
+    switches = ("freeze", "silent", "mute", "untracked", "unlabelled")
+    given = {name: values.get(name, "true" if name in switches else "0.5") for name in CAMERA_FAULTS}
+    lines = [f"{{at_s: 0, cameras: {{{name}: {value}}}}}" for name, value in given.items()]
+    lines += [f"{{at_s: 0, plc: {name}}}" for name in FAULTS]
+    assert len(script(tmp_path, *lines).faults) == len(CAMERA_FAULTS) + len(FAULTS)
+
+
+def test_cameras_change_names_and_version_and_change_them_back(tmp_path, bench):
+    motive, plc = bench
+    made = script(tmp_path, "{at_s: 1, cameras: {renamed: true, version: '3.1'}, for_s: 1}")
+    player = Player(made, motive, {"tcr600": plc}, lambda text: None)
+    player.play(1.0)
+    assert (motive.scene.names, motive.version) == (("a.1?", "a.2?"), (3, 1))
+    player.play(2.0)
+    assert (motive.scene.names, motive.version) == (("a.1", "a.2"), (4, 1))
