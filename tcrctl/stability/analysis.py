@@ -28,9 +28,10 @@ from tcrctl.stability.closed_loop import ClosedLoop, StepMap
 from tcrctl.stability.report import StabilityPoint, StabilityReport
 from tcrctl.trajectory.trajectory import sample_reference
 
-#: Length of a deviation of the loop's state, in the scales of its parts: some micrometres per coordinate, so that
-#: what the solvers of plant and estimator tolerate does not show.
-STEP: Final = 0.2
+#: Length of a deviation of the loop's state, in the scales of its parts: some tens of micrometres per coordinate. At
+#: standstill the solvers of plant and estimator accept what they have until it is off by their tolerance; smaller
+#: or one-sided differences would take such a jump for a slope.
+STEP: Final = 1.0
 #: The same for the inner iteration: nanometres, as rods bent by more change the robot's soft directions.
 INNER_STEP: Final = 1e-4
 #: Eigenvalues kept per point.
@@ -164,7 +165,7 @@ def spectrum_of(step: StepMap) -> tuple[NDArray[np.complex128], bool]:
     Raises:
         DivergenceError: If the plant's integrator did not converge.
     """
-    product = derivative(step, step.size, STEP)
+    product = derivative(step, step.size, STEP, central=True)
     start = np.random.default_rng(0).standard_normal(step.size)
     for _ in range(SMOOTHING if step.size > COUNT else 0):
         start = product(start / np.linalg.norm(start))
