@@ -48,12 +48,13 @@ CASES: dict[str, tuple[str, ...]] = {
     "only rings 8 and 13 measured": ("plant.measured_rings=[8, 13]",),
     "latency 20 ms": ("plant.latency_ms=20.0",),
     "tip load 5 g": ("plant.tip_load_g=5.0",),
-    "push 0.2 N for 1 s": (
-        f"plant.pushes=[{{ring: 13, force_n: [0.2, 0.0, 0.0], start_s: {WHEN}, duration_s: 1.0}}]",
-    ),
-    "push 0.2 N for 1 s, middle": (
-        f"plant.pushes=[{{ring: 7, force_n: [0.0, 0.2, 0.0], start_s: {WHEN}, duration_s: 1.0}}]",
-    ),
+    **{
+        f"push 0.2 N for 1 s on ring {ring}": (
+            f"plant.pushes=[{{ring: {ring}, force_n: [0.2, 0.0, 0.0], start_s: {WHEN}, duration_s: 1.0}}]",
+            "safety.position_error_mm=300.0",
+        )
+        for ring in (2, 3, 5, 7, 13)
+    },
     "start 5 mm off, no blending": (
         "plant.start_drives_mm=[2.4, 1.6, 0.0, 0.0, 0.0, 1.6]",
         "start.blend_s=0",

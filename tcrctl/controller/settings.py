@@ -26,7 +26,7 @@ class TensionSettings(Settings):
     """Keeps every cable taut: a pull towards a reference tension, and a soft floor and ceiling."""
 
     reference_n: float = quantity("N", "tension that every cable is drawn to", 5.0, gt=0)
-    weight: float = quantity("1/N2", "weight of the squared deviation from it", 1.0e-5, ge=0)
+    weight: float = quantity("1/N2", "weight of the squared deviation from it", 1.0e-2, ge=0)
     floor_n: float = quantity("N", "lowest tension wanted", 1.0, ge=0)
     ceiling_n: float = quantity("N", "highest tension wanted", 60.0, gt=0)
     softness: float = quantity(
