@@ -12,6 +12,9 @@ from tcrctl.history import History
 from tcrctl.plots import style
 from tcrctl.signals import Array
 
+#: Runs whose largest errors differ by more than this factor are drawn on a logarithmic axis.
+APART = 10.0
+
 
 def draw(histories: Sequence[History]) -> Figure:
     """Draw the position error [mm] and, where an orientation was wanted, the orientation error [deg].
@@ -31,6 +34,9 @@ def draw(histories: Sequence[History]) -> Figure:
         _components(panels[1], histories[0])
     if oriented:
         panels[-1].set_ylabel("orientation error [deg]")
+    errors = [panels[0], panels[-1]] if oriented else [panels[0]]
+    for panel in errors:
+        _scale(panel)
     for panel in panels:
         panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3 if single else 1, borderaxespad=0.1)
     style.span(panels, histories)
@@ -41,7 +47,15 @@ def _draw(panel: Axes, index: int, history: History, error: Array, name: str, un
     known = error[np.isfinite(error)]
     label = f"{name}max {known.max():.3g} {unit}, rms {np.sqrt(np.mean(known**2)):.3g} {unit}"
     panel.plot(history.t, error, **style.line(index), label=label)
-    panel.set_ylim(bottom=0.0)
+
+
+def _scale(panel: Axes) -> None:
+    """From zero to the largest error; logarithmic if one run's would flatten another's."""
+    largest = [float(np.nanmax(line.get_ydata())) for line in panel.lines]
+    if max(largest) > APART * min(largest) > 0.0:
+        panel.set(yscale="log", ylim=(1e-2 * min(largest), 2.0 * max(largest)))
+    else:
+        panel.set_ylim(bottom=0.0)
 
 
 def _components(panel: Axes, history: History) -> None:
