@@ -28,8 +28,8 @@ from tcrctl.stability.closed_loop import ClosedLoop, StepMap
 from tcrctl.stability.report import StabilityPoint, StabilityReport
 from tcrctl.trajectory.trajectory import sample_reference
 
-#: Length of a deviation of the loop's state, in the scales of its parts: some tens of micrometres per coordinate. At
-#: standstill the solvers of plant and estimator accept what they have until it is off by their tolerance; smaller
+#: Length of a deviation of the loop's state, in the scales of its parts: some tens of micrometres per coordinate.
+#: At standstill the solvers of plant and estimator accept what they have until it is off by their tolerance; smaller
 #: or one-sided differences would take such a jump for a slope.
 STEP: Final = 1.0
 #: The same for the inner iteration: nanometres, as rods bent by more change the robot's soft directions.
