@@ -29,8 +29,8 @@ from tcrctl.stability.report import StabilityPoint, StabilityReport
 from tcrctl.trajectory.trajectory import sample_reference
 
 #: Length of a deviation of the loop's state, in the scales of its parts: some tens of micrometres per coordinate.
-#: At standstill the solvers of plant and estimator accept what they have until it is off by their tolerance;
-#: smaller or one-sided differences would take such a jump for a slope.
+#: At standstill the solvers of plant and estimator accept what they have until it is off by their tolerance; with
+#: smaller or one-sided differences such a jump would pass for a slope.
 STEP: Final = 1.0
 #: The same for the inner iteration: nanometres, as rods bent by more change the robot's soft directions.
 INNER_STEP: Final = 1e-4
