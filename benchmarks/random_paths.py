@@ -3,8 +3,8 @@
     python benchmarks/random_paths.py [--paths 50] [--seed 1] [--jobs N] [--json]
 
 A path goes through two to four poses of the nominal robot at rest with random drives, straight and with the normal
-on a great circle, in 20 to 60 s. A path that the feasibility check refuses is drawn again and counted. Exit code 1
-if a run diverges.
+on a great circle, in 20 to 60 s. A path that the feasibility check refuses, for the nominal robot or for the plant,
+whose weaker springs cannot hold every pose with taut cables, is drawn again and counted. Exit code 1 if a run diverges.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from rich.console import Console
 from rich.table import Table
 
 from tcrctl.errors import InfeasibleError, NoEquilibriumError
-from tcrctl.experiment import plan, prepare
+from tcrctl.experiment import build_plant, plan, prepare
+from tcrctl.feasibility import DriveLimits, check_feasibility
 from tcrctl.robot import pose
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.equilibrium import equilibrium
@@ -34,6 +35,8 @@ from tcrctl.trajectory.pose_settings import WaypointSettings, WaypointsSettings
 SHORTEST_S, LONGEST_S = 20.0, 60.0
 #: Tensions of the nominal robot at a waypoint [N]; the weaker springs of the plant need some room.
 TENSIONS = (2.0, 30.0)
+#: What the plant must be able to do along the whole path: the limits that the feasibility check has for the model.
+LIMITS = DriveLimits(speed=0.05, floor=1.0, ceiling=60.0)
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,7 @@ def walk(seed: int) -> Walk:
             continue
         try:
             plan(experiment)
+            check_feasibility(experiment.trajectory, build_plant(experiment)[0].robot, LIMITS)
         except InfeasibleError:
             refused += 1
             continue
