@@ -4,7 +4,8 @@
 
 A path goes through two to four poses of the nominal robot at rest with random drives, straight and with the normal
 on a great circle, in 20 to 60 s. A path that the feasibility check refuses, for the nominal robot or for the plant,
-whose weaker springs cannot hold every pose with taut cables, is drawn again and counted. Exit code 1 if a run diverges.
+whose weaker springs cannot hold every pose with taut cables, is drawn again and counted. Exit code 1 if a run
+diverges.
 """
 
 from __future__ import annotations
