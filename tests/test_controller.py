@@ -173,6 +173,26 @@ def test_no_lasting_error_on_a_plant_of_other_material(tcr700):
     assert np.abs(speeds).max() <= 0.05
 
 
+STIFF = Mismatch(springs_youngs_modulus=1.4, cables_youngs_modulus=1.3, density=0.7)
+
+
+def test_a_plant_whose_slow_modes_are_half_as_fast_again_is_held(tcr700):
+    errors, _, infos = closed_loop(
+        tcr700, pose_settings(), (0.004, 0.002, 0.02), 12.0, STIFF, noise=50.0, latency=10.0
+    )
+    assert all(info.converged for info in infos)
+    assert errors[-40:].max() < 2e-4
+
+
+def test_quick_changes_of_speed_pump_up_modes_that_the_model_does_not_know(tcr700):
+    """Why W is as large as it is: the same loop with a sixteenth of it."""
+    quick = pose_settings().weights.model_copy(update={"speed_change": 3.5e3 / 16})
+    errors, _, _ = closed_loop(
+        tcr700, pose_settings().model_copy(update={"weights": quick}), (0.004, 0.002, 0.02), 6.0, STIFF
+    )
+    assert errors[-20:].max() > 2.0 * errors[40:60].max()
+
+
 def test_without_integral_and_offset_a_mismatched_plant_keeps_an_error(tcr600):
     """The laws above would be empty if feedback alone removed the error."""
     mismatch = Mismatch(springs_youngs_modulus=0.7, density=1.2)
