@@ -480,7 +480,7 @@ def test_paced_steps_begin_a_period_apart(running):
 
 
 def test_a_run_that_begins_far_from_its_trajectory_is_longer_by_the_way_there_says_so_and_replays(tmp_path):
-    far = prepare(short_spec(start={"blend_s": 0.1, "approach_mm_s": 5.0}))
+    far = prepare(short_spec("start.blend_s=0.1", "start.approach_mm_s=5"))
     summary = run_experiment(far, out=tmp_path)
     log = read_log(summary.log)
     starts = [event for event in log.events() if event.kind == "start"]
