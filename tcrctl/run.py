@@ -87,6 +87,8 @@ def run_experiment(
             folder = make_run_folder(out, experiment.spec.name)
             log = _open_log(experiment, folder, realtime=realtime, tap=tap)
             journal.attach(log.event)
+            approach = parts.trajectory.duration - experiment.trajectory.duration
+            journal.report("start", *_start_message(parts.start_offset, approach))
         except BaseException:
             plant.close()
             raise
@@ -176,8 +178,6 @@ def _drive(
     """Go through all steps and leave the plant safe; return why it ended before the end, if it did."""
     failure: TcrctlError | None = None
     try:
-        approach = parts.trajectory.duration - experiment.trajectory.duration
-        log.event(0.0, "start", *_start_message(parts.start_offset, approach))
         with _pace_kept(experiment, pace, log):
             parts.plant.start()
             run_loop(
