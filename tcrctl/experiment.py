@@ -216,7 +216,7 @@ def build_parts(experiment: Experiment, plant: RunnablePlant, state: State | Non
     found = measured_pose(plant, robot)
     if found is not None:
         offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))
-        trajectory = StartBlend(trajectory, *found, spec.start.blend_s)
+        trajectory = StartBlend(trajectory, *found, spec.start.blend_s, spec.start.approach)
     estimator = build_estimator(spec.estimator, robot, experiment.period, state)
     return Parts(trajectory, plant, estimator, build_controller(spec.controller, robot), offset)
 

@@ -22,7 +22,7 @@ from tcrctl.interruption import Interruption
 from tcrctl.log.geometry import CableRoute, LogGeometry
 from tcrctl.log.mcap_file import Tap
 from tcrctl.log.writer import LogWriter
-from tcrctl.loop import run_loop
+from tcrctl.loop import run_loop, step_count
 from tcrctl.metrics import Metrics
 from tcrctl.pacing import Pace, RealTime, Unpaced
 from tcrctl.plant.journal import Journal
@@ -87,6 +87,8 @@ def run_experiment(
             folder = make_run_folder(out, experiment.spec.name)
             log = _open_log(experiment, folder, realtime=realtime, tap=tap)
             journal.attach(log.event)
+            approach = parts.trajectory.duration - experiment.trajectory.duration
+            journal.report("start", *_start_message(parts.start_offset, approach))
         except BaseException:
             plant.close()
             raise
@@ -145,14 +147,15 @@ def _recorded_run(
     experiment: Experiment, parts: Parts, pace: Pace, folder: RunFolder, log: LogWriter, progress: Progress
 ) -> Summary:
     """Run, close the plant, finish the log."""
-    metrics, task = Metrics(experiment.steps, paced=isinstance(pace, RealTime)), make_task(experiment)
+    steps = step_count(parts.trajectory.duration, experiment.period)
+    metrics, task = Metrics(steps, paced=isinstance(pace, RealTime)), make_task(experiment)
 
     def record(step: StepRecord) -> None:
         log.step(step)
         metrics.add(step)
         for event in () if task is None else task.observe(step):
             log.event(event.t, event.kind, event.level, event.message)
-        progress(step.k + 1, experiment.steps)
+        progress(step.k + 1, steps)
 
     with log:
         failure = _drive(experiment, parts, pace, record, log)
@@ -175,7 +178,6 @@ def _drive(
     """Go through all steps and leave the plant safe; return why it ended before the end, if it did."""
     failure: TcrctlError | None = None
     try:
-        log.event(0.0, "start", *_start_message(parts.start_offset))
         with _pace_kept(experiment, pace, log):
             parts.plant.start()
             run_loop(
@@ -208,14 +210,15 @@ def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractCo
     return quiet_interpreter(priority, lambda text: log.event(0.0, "start", "warning", text))
 
 
-def _start_message(offset: float) -> tuple[str, str]:
-    """Level and text of what is known about the start."""
+def _start_message(offset: float, approach: float) -> tuple[str, str]:
+    """Level and text of what is known about the start: offset [m], and time [s] that the way there takes."""
     if math.isnan(offset):
         return (
             "warning",
             "the tip ring is not measured: the run begins at the trajectory's start, not the robot's",
         )
-    return "info", f"the robot starts {1e3 * offset:.3f} mm beside the trajectory"
+    beside = f"the robot starts {1e3 * offset:.3f} mm beside the trajectory"
+    return ("warning", f"{beside} and first goes there, {approach:.1f} s") if approach else ("info", beside)
 
 
 def _summary(

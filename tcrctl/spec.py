@@ -66,6 +66,14 @@ class StartSettings(Settings):
     blend_s: float = quantity(
         "s", "time in which the offset of the start pose fades out; 0: begin with a step", 2.0, ge=0
     )
+    approach_mm_s: float = quantity(
+        "mm/s", "if fading would be faster, the robot first goes to the start at this speed", 20.0, gt=0
+    )
+
+    @property
+    def approach(self) -> float:
+        """``approach_mm_s`` in m/s."""
+        return 1e-3 * self.approach_mm_s
 
 
 class ExperimentSpec(Settings):

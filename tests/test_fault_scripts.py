@@ -12,10 +12,10 @@ from tcrctl.emulate.fault_script import CAMERA_FAULTS, Player, load_fault_script
 from tcrctl.errors import SpecError
 
 
-def script(tmp_path, *lines):
+def script(tmp_path, *lines, **names):
     path = tmp_path / "faults.yaml"
     path.write_text("faults:\n" + "".join(f"  - {line}\n" for line in lines))
-    return load_fault_script(path)
+    return load_fault_script(path, **names)
 
 
 WRONG = {
@@ -30,6 +30,8 @@ WRONG = {
     "not pairs": ("{at_s: 1, cameras: {swap: [a, b]}}", "must be a list of pairs"),
     "not a version": ("{at_s: 1, cameras: {version: 4.1}}", "must be a version such as '3.1'"),
     "before the start": ("{at_s: -1, plc: estop}", "must be >= 0"),
+    "more than all frames": ("{at_s: 1, cameras: {loss: 3}}", "must be a share of the frames, 0 to 1, not 3"),
+    "earlier than now": ("{at_s: 1, cameras: {delay_s: -0.1}}", "must be >= 0, not -0.1"),
     "unknown event": ("{at_s: 1, after: lunch, plc: estop}", "after"),
 }
 
@@ -41,6 +43,23 @@ def test_a_mistake_is_found_before_anything_starts(name, tmp_path):
         script(tmp_path, line)
     assert message in str(caught.value)
     assert "faults.yaml:2:" in str(caught.value)
+
+
+STRANGERS = {
+    "robot": ("{at_s: 1, plc: estop, robot: tcr999}", ":2:27: faults.0.robot: there is no robot tcr999"),
+    "marker": ("{at_s: 1, cameras: {nan: [a.1, b.7]}}", ":2:25: faults.0.cameras.nan: there is no marker b.7"),
+    "pair": ("{at_s: 1, cameras: {swap: [[a.1, c.3]]}}", "there is no marker c.3"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STRANGERS)
+def test_a_robot_or_marker_that_is_not_on_the_rig_is_found_before_anything_starts(name, tmp_path):
+    line, message = STRANGERS[name]
+    known = {"robots": ["tcr600", "tcr700"], "markers": ["a.1", "a.2"]}
+    with pytest.raises(SpecError) as caught:
+        script(tmp_path, line, **known)
+    assert message in str(caught.value)
+    script(tmp_path, line.replace("tcr999", "tcr600").replace("b.7", "a.2").replace("c.3", "a.2"), **known)
 
 
 @pytest.fixture

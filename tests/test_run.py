@@ -477,3 +477,14 @@ def test_paced_steps_begin_a_period_apart(running):
     columns = log.columns(["timing_lateness"])
     assert np.median(columns["timing_lateness"]) < 0.01
     assert columns["timing_lateness"].min() >= 0.0
+
+
+def test_a_run_that_begins_far_from_its_trajectory_is_longer_by_the_way_there_says_so_and_replays(tmp_path):
+    far = prepare(short_spec("start.blend_s=0.1", "start.approach_mm_s=5"))
+    summary = run_experiment(far, out=tmp_path)
+    log = read_log(summary.log)
+    starts = [event for event in log.events() if event.kind == "start"]
+    assert summary.measures.steps > far.steps
+    assert [event.level for event in starts] == ["warning"]
+    assert "first goes there" in starts[0].message
+    assert replay(summary.log).status == "identical"

@@ -75,3 +75,25 @@ def test_without_blending_the_trajectory_is_unchanged():
     np.testing.assert_array_equal(blended.position(t), Swing().position(t))
     np.testing.assert_array_equal(blended.normal(t), Swing().normal(t))
     assert blended.duration == Swing.duration
+
+
+def test_a_robot_far_away_first_goes_to_the_start_and_no_faster_than_it_may():
+    place = Swing().position(np.zeros(1))[0] + np.array([0.03, -0.04, 0.0])
+    blended = StartBlend(Swing(), place, UP, 2.0, speed=0.02)
+    assert blended.duration == Swing.duration + blended.approach
+    t = np.linspace(0.0, blended.approach, 2001)
+    path = blended.position(t)
+    speed = np.linalg.norm(np.diff(path, axis=0), axis=1) / np.diff(t)
+    assert 0.0199 < speed.max() < 0.02 + 1e-9
+    np.testing.assert_allclose(path[[0, -1]], [place, Swing().position(np.zeros(1))[0]], atol=1e-15)
+    later = np.linspace(0.0, 10.0, 7)
+    np.testing.assert_allclose(
+        blended.position(blended.approach + later), Swing().position(later), atol=1e-12
+    )
+    np.testing.assert_allclose(blended.normal(blended.approach + later), Swing().normal(later), atol=1e-12)
+
+
+def test_a_robot_near_enough_does_not_wait():
+    place = Swing().position(np.zeros(1))[0] + np.array([0.0, 0.001, 0.0])
+    assert StartBlend(Swing(), place, UP, 2.0, speed=0.02).duration == Swing.duration
+    assert StartBlend(Swing(), place + 0.1, UP, 0.0, speed=0.02).duration == Swing.duration

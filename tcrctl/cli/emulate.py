@@ -78,12 +78,12 @@ def _built(
     rig: str, faults: Path | None, perfect: bool, rate_hz: float, watchdog_ms: int
 ) -> tuple[EmulatedBench, FaultScript | None]:
     from tcrctl.compilation import announced_compilation
-    from tcrctl.emulate.bench import EmulatedBench, EmulationSettings
+    from tcrctl.emulate.bench import EmulatedBench, EmulationSettings, marker_names
     from tcrctl.emulate.fault_script import load_fault_script
     from tcrctl.plant.rig_file import read_rig
 
     file, *_ = read_rig(rig)
-    script = None if faults is None else load_fault_script(faults)
+    script = None if faults is None else load_fault_script(faults, file.robots, marker_names(file))
     settings = EmulationSettings(rate=rate_hz, watchdog_ms=watchdog_ms)
     if perfect:
         settings = replace(settings, mismatch=None, noise=1e-9)

@@ -10,6 +10,7 @@ the numbers.
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -41,6 +42,11 @@ MARGIN: Final = 5000
 SHIPPED_MISMATCH: Final = Mismatch(springs_youngs_modulus=0.7, density=1.2)
 #: How often the fault script looks at the time, and the main thread at the signals [s].
 TICK: Final = 0.005
+#: What to do if the port of the cameras cannot be had.
+HINTS: Final = {
+    errno.EADDRINUSE: "Is another tcrctl emulate running?",
+    errno.EACCES: "Ports below 1024 need privileges.",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +107,12 @@ class EmulatedBench:
             self.plcs[name] = PlcEmulator(_plc_settings(mounted, settings))
             self.robots[name] = self._moved(name, mounted, robot)
             self._back[name] = transform(mounted.calibration)
-            names += _labels(mounted, robot)
+            names += _labels(mounted, robot.n_modules)
         try:
             self.motive = MotiveEmulator(names, self._markers, _motive_settings(rig, settings))
         except OSError as error:
             where = f"{rig.cameras.server}:{rig.cameras.command_port}"
-            hint = "Is another tcrctl emulate running?"
+            hint = HINTS.get(error.errno or 0, "Only addresses of this computer can be emulated.")
             raise DeviceError(
                 f"cameras cannot be emulated at {where}: {error.strerror}", hint=hint
             ) from error
@@ -224,13 +230,29 @@ def _address(mounted: MountedRobot) -> tuple[str, int]:
     return plc.host, plc.port
 
 
-def _labels(mounted: MountedRobot, robot: Robot) -> list[str]:
+def marker_names(rig: RigFile) -> list[str]:
+    """Names of all markers on a rig, as Motive streams them.
+
+    Args:
+        rig: The bench.
+
+    Raises:
+        InputError: If the rig file does not say them.
+    """
+    return [
+        label
+        for name, mounted in rig.robots.items()
+        for label in _labels(mounted, load_robot(name).modules.count)
+    ]
+
+
+def _labels(mounted: MountedRobot, modules: int) -> list[str]:
     """Names of all markers of a robot: base ring, then ring by ring."""
     markers = mounted.markers
     if markers.labels is None:
         raise InputError("markers.labels is needed to emulate a rig; markers.nodes alone is not enough")
     base = [markers.base.format(node=node) for node in (1, 2, 3)]
-    rings = range(1, robot.n_modules + 1)
+    rings = range(1, modules + 1)
     return base + [markers.labels.format(ring=ring, node=node) for ring in rings for node in (1, 2, 3)]
 
 

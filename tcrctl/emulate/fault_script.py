@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -26,12 +26,17 @@ from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.emulators.plc_faults import FAULTS
 from tcr_hardware.modbus.registers import Status
 from tcrctl import strict_yaml
+from tcrctl.errors import Problem, SpecError
 from tcrctl.settings import Path as Keys
 from tcrctl.settings import Settings, quantity, refuse
 
 _DEFAULTS = MotiveFaults()
 _CHANGES = {"version": "", "renamed": False}
 CAMERA_FAULTS = (*(field.name for field in dataclasses.fields(MotiveFaults)), *_CHANGES)
+#: Camera faults that are shares of all frames.
+SHARES = ("loss", "duplicate", "corrupt", "truncate", "wrong_size")
+#: Camera faults that name markers.
+MARKERS = ("occluded", "missing", "nan", "swap")
 #: A drive that moves faster than this between two looks is moving [um].
 MOVING_UM = 30.0
 
@@ -81,9 +86,13 @@ def _unknown(fault: Fault) -> Iterator[tuple[Keys, str]]:
 def _wrong_value(name: str, value: Any) -> str:
     """What is wrong with the value of a camera fault; empty if nothing is."""
     try:
-        camera_value(name, value)
+        taken = camera_value(name, value)
     except (TypeError, ValueError) as error:
         return str(error)
+    if name in SHARES and not 0 <= taken <= 1:
+        return f"must be a share of the frames, 0 to 1, not {value!r}"
+    if name in ("delay_s", "reorder") and not 0 <= taken < float("inf"):
+        return f"must be >= 0, not {value!r}"
     return ""
 
 
@@ -129,14 +138,45 @@ class FaultScript(Settings):
     faults: tuple[Fault, ...] = Field(min_length=1)
 
 
-def load_fault_script(path: Path) -> FaultScript:
+def load_fault_script(
+    path: Path, robots: Collection[str] | None = None, markers: Collection[str] | None = None
+) -> FaultScript:
     """Read a fault script.
 
+    Args:
+        path: The file.
+        robots: Robots that there are; None if any name may be given.
+        markers: Markers that there are, by Motive's names; None if any name may be given.
+
     Raises:
-        SpecError: If the file has problems; all are listed.
+        SpecError: If the file has problems, or names a robot or marker that does not exist; all are listed.
         InputError: If it cannot be read.
     """
-    return strict_yaml.validate(strict_yaml.load(path), FaultScript)
+    document = strict_yaml.load(path)
+    script = strict_yaml.validate(document, FaultScript)
+    problems = [
+        Problem(document.where(keys), ".".join(map(str, keys)), message)
+        for i, fault in enumerate(script.faults)
+        for keys, message in _strangers(fault, ("faults", i), robots, markers)
+    ]
+    if problems:
+        raise SpecError(problems)
+    return script
+
+
+def _strangers(
+    fault: Fault, at: Keys, robots: Collection[str] | None, markers: Collection[str] | None
+) -> Iterator[tuple[Keys, str]]:
+    """Names in a fault that nobody on the rig has."""
+    if robots is not None and fault.robot is not None and fault.robot not in robots:
+        yield (*at, "robot"), f"there is no robot {fault.robot} on the rig; there are {', '.join(robots)}"
+    for key, value in fault.cameras.items() if isinstance(fault.cameras, dict) else ():
+        if markers is None or key not in MARKERS:
+            continue
+        given = [name for pair in value for name in pair] if key == "swap" else value
+        if unknown := [name for name in given if name not in markers]:
+            some = ", ".join(list(markers)[:4])
+            yield (*at, "cameras", key), f"there is no marker {', '.join(unknown)}; there are {some}, ..."
 
 
 class Player:

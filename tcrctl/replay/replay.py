@@ -133,7 +133,8 @@ class _Session:
             return self._plant
         trajectory = make_trajectory(recorded, self.robot)
         normal = self.robot.rest_normal if first.reference.normal is None else first.reference.normal
-        return StartBlend(trajectory, first.reference.position, normal, recorded.start.blend_s)
+        start = recorded.start
+        return StartBlend(trajectory, first.reference.position, normal, start.blend_s, start.approach)
 
     def run(
         self, record: Callable[[StepRecord], None] | None, progress: Progress

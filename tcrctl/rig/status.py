@@ -76,7 +76,7 @@ def rig_status(loaded: LoadedRig, names: tuple[str, ...]) -> RigStatus:
         return RigStatus(loaded.robot, None, {}, cameras, str(error), error.exit_code)
     finally:
         drives.close()
-    positions = {name: 1e-3 * int(um) for name, um in zip(names, status.position, strict=True)}
+    positions = {name: int(um) / 1e3 for name, um in zip(names, status.position, strict=True)}
     code = DeviceError.exit_code if camera_error else 0
     return RigStatus(loaded.robot, status, positions, cameras, camera_error, code)
 

@@ -130,4 +130,4 @@ def _at_zero(status: DriveStatus) -> bool:
 
 
 def _positions(names: tuple[str, ...], status: DriveStatus) -> dict[str, float]:
-    return {name: 1e-3 * int(um) for name, um in zip(names, status.position, strict=True)}
+    return {name: int(um) / 1e3 for name, um in zip(names, status.position, strict=True)}

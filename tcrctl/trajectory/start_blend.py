@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from tcrctl.numerics import rotation
 from tcrctl.signals import Array
 from tcrctl.trajectory.trajectory import Trajectory, drives_of
+
+#: Steepest slope of the fading, at its middle.
+STEEPEST: Final = 35.0 / 16.0
 
 
 def fade_out(x: Array) -> Array:
@@ -22,11 +27,17 @@ class StartBlend:
     A real robot at rest stands a millimetre or a degree beside its model. Without this, every run would begin
     with a step of the reference, and a step excites the slow modes.
 
+    A robot that stands so far away that fading would be faster than ``speed``, for instance where the run before
+    has left it, first goes to the start of the trajectory, as slowly as that.
+
     Attributes:
-        duration: That of the trajectory [s].
+        approach: Time until the trajectory begins [s]; 0 if the robot is near enough.
+        duration: That of the approach and the trajectory [s].
     """
 
-    def __init__(self, trajectory: Trajectory, position: Array, normal: Array, blend: float) -> None:
+    def __init__(
+        self, trajectory: Trajectory, position: Array, normal: Array, blend: float, speed: float = np.inf
+    ) -> None:
         """Take up a trajectory.
 
         Args:
@@ -34,10 +45,14 @@ class StartBlend:
             position: End position of the robot before the first step (3,) [m].
             normal: Its unit end normal (3,); not used if the trajectory leaves the orientation free.
             blend: Time in which the offset fades out [s]; 0: no offset, the run begins with a step.
+            speed: Largest speed at which the offset may fade out while the trajectory goes on [m/s].
         """
-        self._trajectory, self._blend = trajectory, blend
+        self._trajectory = trajectory
         zero = np.zeros(1)
         self._offset = position - trajectory.position(zero)[0]
+        needed = STEEPEST * float(np.linalg.norm(self._offset)) / speed
+        self.approach = needed if needed > blend > 0.0 else 0.0
+        self._fading = self.approach or blend
         wanted = trajectory.normal(zero)
         self._turn = np.zeros(3)
         if wanted is not None:
@@ -45,26 +60,30 @@ class StartBlend:
 
     @property
     def duration(self) -> float:
-        """Duration of the trajectory [s]."""
-        return self._trajectory.duration
+        """Duration of the approach and the trajectory [s]."""
+        return self.approach + self._trajectory.duration
 
     def position(self, t: Array) -> Array:
         """Return end positions at times t (n,) [s] as (n, 3) [m]."""
-        position: Array = self._trajectory.position(t) + self._left(t)[:, None] * self._offset
+        position: Array = self._trajectory.position(self._since(t)) + self._left(t)[:, None] * self._offset
         return position
 
     def normal(self, t: Array) -> Array | None:
         """Return unit end normals at times t (n,) [s] as (n, 3), or None if the orientation is free."""
-        wanted = self._trajectory.normal(t)
+        wanted = self._trajectory.normal(self._since(t))
         return None if wanted is None else _turned(wanted, self._left(t)[:, None] * self._turn)
 
     def drive(self, t: Array) -> Array | None:
         """Return the trajectory's drive lengths at times t (n,) [s] as (n, m) [m], or None; no offset on them."""
-        return drives_of(self._trajectory, t)
+        return drives_of(self._trajectory, self._since(t))
+
+    def _since(self, t: Array) -> Array:
+        """Times of the trajectory at times t (n,) of the run."""
+        return np.maximum(t - self.approach, 0.0) if self.approach else t
 
     def _left(self, t: Array) -> Array:
         """Part of the offset that is left at times t (n,)."""
-        return fade_out(t / self._blend) if self._blend > 0.0 else np.zeros(t.shape)
+        return fade_out(t / self._fading) if self._fading > 0.0 else np.zeros(t.shape)
 
 
 def _turned(vectors: Array, turns: Array) -> Array:

@@ -17,14 +17,20 @@ def cable_names(description: RobotDescription) -> tuple[str, ...]:
 
 
 def flat(value: dict[str, Any], prefix: str = "") -> dict[str, str]:
-    """A result as one text per number, by its path."""
+    """A result as one text per number, by its path; what is not known is left out."""
     rows: dict[str, str] = {}
     for key, item in value.items():
         if isinstance(item, dict):
             rows |= flat(item, f"{prefix}{key} ")
-        else:
-            rows[prefix + key] = f"{item:.3f}" if isinstance(item, float) else str(item)
+        elif item is not None:
+            rows[prefix + key] = _text(item)
     return rows
+
+
+def _text(item: Any) -> str:
+    if isinstance(item, bool):
+        return "yes" if item else "no"
+    return f"{item:.3f}" if isinstance(item, float) else str(item)
 
 
 def print_rows(title: str, rows: dict[str, str]) -> None:
