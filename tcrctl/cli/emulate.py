@@ -39,12 +39,11 @@ def emulate(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    r"""Emulate cameras, PLCs and robots of a rig file; then run experiments on it from another terminal.
+    """Emulate cameras, PLCs and robots of a rig file; then run experiments on it from another terminal.
 
     The robots are those of the shipped experiments: springs 30 % softer and density 20 % higher than the
     controller believes, 50 um of marker noise. With --json, one object with counts at the end.
 
-    \b
     Examples:
       tcrctl emulate
       tcrctl run letter_t --set plant.kind=rig --set plant.rig=loopback --yes    (in another terminal)

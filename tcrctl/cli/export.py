@@ -35,7 +35,7 @@ def export(
     as_npz: Annotated[bool, typer.Option("--npz", help="One numpy array per quantity.")] = False,
     as_parquet: Annotated[
         bool,
-        typer.Option("--parquet", help="As CSV, in Apache Parquet; needs pip install 'tcrctl[parquet]'."),
+        typer.Option("--parquet", help="As CSV, in Apache Parquet; needs pip install 'tcrctl\\[parquet]'."),
     ] = False,
     out: Annotated[
         Path | None,

@@ -75,7 +75,6 @@ def identify(
     The result goes to a new folder DIR/TIME_NAME_ID with robot.yaml, report.json, figure.png and spec.yaml.
     Ctrl-C keeps the best answer so far.
 
-    \b
     Examples:
       tcrctl identify identify_table2
       tcrctl identify my_data.yaml --method least-squares --json

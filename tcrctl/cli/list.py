@@ -11,9 +11,8 @@ from tcrctl.cli.options import AsJson
 
 
 def list_shipped(as_json: AsJson = False) -> None:
-    r"""List the shipped experiments, identifications, robots and rigs.
+    """List the shipped experiments, identifications, robots and rigs.
 
-    \b
     Examples:
       tcrctl list
       tcrctl list --json | jq -r '.experiments[].name'

@@ -16,9 +16,8 @@ def new(
         str, typer.Option("--from", metavar="SPEC", help="Experiment to start from.")
     ] = "letter_t",
 ) -> None:
-    r"""Write a new experiment file, a copy of an existing one under a new name.
+    """Write a new experiment file, a copy of an existing one under a new name.
 
-    \b
     Examples:
       tcrctl new my_letter
       tcrctl new studies/slow.yaml --from letter_i

@@ -46,13 +46,12 @@ def paper(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    r"""Run every experiment of the paper and compare: paper, bar, goal, measured.
+    """Run every experiment of the paper and compare: paper, bar, goal, measured.
 
     Runs whose computing time counts have the machine for themselves; the others run side by side. The report
     goes to a new folder DIR/TIME_paper_ID with paper.md, paper.json and all runs. Exit code 3: a bar was missed.
     Ctrl-C stops all runs and keeps what is done.
 
-    \b
     Examples:
       tcrctl paper
       tcrctl paper --only letters --only table2

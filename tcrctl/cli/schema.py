@@ -17,9 +17,8 @@ def schema(
         bool, typer.Option("--identification", help="Identification files instead of experiments.")
     ] = False,
 ) -> None:
-    r"""Print the JSON Schema of experiment files, for completion and checks in an editor.
+    """Print the JSON Schema of experiment files, for completion and checks in an editor.
 
-    \b
     Example:
       tcrctl schema > tcrctl.schema.json
     and as the first line of an experiment file:

@@ -12,9 +12,8 @@ if TYPE_CHECKING:
 
 
 def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_json: AsJson = False) -> None:
-    r"""Print an experiment as it will run: defaults filled in, --set applied.
+    """Print an experiment as it will run: defaults filled in, --set applied.
 
-    \b
     Examples:
       tcrctl show letter_t
       tcrctl show letter_t --set controller.tension=off --json

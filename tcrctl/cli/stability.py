@@ -46,14 +46,13 @@ def stability(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    r"""Tell whether the loop of an experiment is stable, by linearising it along a simulated run without noise.
+    """Tell whether the loop of an experiment is stable, by linearising it along a simulated run without noise.
 
-    Two numbers per point: the largest \|mu\| of the controller's inner iteration (42), which says that it converges
+    Two numbers per point: the largest |mu| of the controller's inner iteration (42), which says that it converges
     within a step; and the spectral radius of the whole loop from step to step (plant, estimator, controller), which
     says that deviations fade: below 1 is stable. A point takes some seconds. Exit code 3 if a radius is not below
     1, 4 if the run had to be stopped.
 
-    \b
     Examples:
       tcrctl stability fixed_point_rotation
       tcrctl stability helix --set controller.model=static --figure helix.png

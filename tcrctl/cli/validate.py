@@ -17,9 +17,8 @@ def validate(
     robot: IsRobot = False,
     as_json: AsJson = False,
 ) -> None:
-    r"""Check experiment and identification files without running them; exit code 2 if there is a problem.
+    """Check experiment and identification files without running them; exit code 2 if there is a problem.
 
-    \b
     Examples:
       tcrctl validate my_experiment.yaml
       tcrctl validate letter_t --set controller.horizon_s=0.3

@@ -26,9 +26,8 @@ def calibrate(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the result, change no file.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    r"""Measure the markers on the base ring and write into the rig file where the cameras' frame lies.
+    """Measure the markers on the base ring and write into the rig file where the cameras' frame lies.
 
-    \b
     Examples:
       tcrctl rig calibrate loopback --robot tcr600 --dry-run
       tcrctl rig calibrate my_bench.yaml --seconds 20

@@ -21,12 +21,11 @@ def check(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only the rig file, no device.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    r"""Find out whether cameras and drives are as the rig file says, and ready; only reads.
+    """Find out whether cameras and drives are as the rig file says, and ready; only reads.
 
     Exit code of the first line that is not ok: 2 the rig file is wrong, 4 not ready to be armed, 5 a device does
     not answer.
 
-    \b
     Examples:
       tcrctl rig check loopback
       tcrctl rig check my_bench.yaml --robot tcr700 --period-s 0.01 --json

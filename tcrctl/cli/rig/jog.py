@@ -28,9 +28,8 @@ def jog(
     yes: Yes = False,
     as_json: AsJson = False,
 ) -> None:
-    r"""Move cables slowly and smoothly, within the limits of the rig file; Ctrl-C stops.
+    """Move cables slowly and smoothly, within the limits of the rig file; Ctrl-C stops.
 
-    \b
     Examples:
       tcrctl rig jog loopback --robot tcr600 --cable c1 --by-mm 2
       tcrctl rig jog my_bench.yaml --cable all --to-mm 0 --speed-mm-s 3

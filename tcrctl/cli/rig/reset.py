@@ -10,9 +10,8 @@ from tcrctl.cli.rig.options import DryRun, Rig, Robot, Yes
 def reset(
     rig: Rig, robot: Robot = None, dry_run: DryRun = False, yes: Yes = False, as_json: AsJson = False
 ) -> None:
-    r"""Clear the latched fault of the PLC, after its cause has been removed. Nothing moves.
+    """Clear the latched fault of the PLC, after its cause has been removed. Nothing moves.
 
-    \b
     Examples:
       tcrctl rig reset loopback --robot tcr600 --dry-run
       tcrctl rig reset my_bench.yaml --yes

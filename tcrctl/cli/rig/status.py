@@ -13,9 +13,8 @@ from tcrctl.cli.rig.rows import cable_names, flat, print_rows
 
 
 def status(rig: Rig, robot: Robot = None, as_json: AsJson = False) -> None:
-    r"""Show where the drives are, what they say, and whether the cameras stream; only reads.
+    """Show where the drives are, what they say, and whether the cameras stream; only reads.
 
-    \b
     Examples:
       tcrctl rig status loopback
       tcrctl rig status my_bench.yaml --json | jq .robots[0].drives.position_mm

@@ -10,11 +10,10 @@ from tcrctl.cli.rig.options import DryRun, Rig, Robot, Yes
 def zero(
     rig: Rig, robot: Robot = None, dry_run: DryRun = False, yes: Yes = False, as_json: AsJson = False
 ) -> None:
-    r"""Make the present positions of all drives zero: tension-zero, at which every cable has its rest tension.
+    """Make the present positions of all drives zero: tension-zero, at which every cable has its rest tension.
 
     Bring the cables to their rest tension first, with the manual mode of the PLC; see docs/bench.md. Nothing moves.
 
-    \b
     Examples:
       tcrctl rig zero loopback --robot tcr600 --dry-run
       tcrctl rig zero my_bench.yaml
