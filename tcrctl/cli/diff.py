@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tcrctl.cli.log_file import log_path
 from tcrctl.cli.options import AsJson
 
 if TYPE_CHECKING:
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
 
 
 def diff(
-    a: Annotated[Path, typer.Argument(metavar="A", help="Log of a run.")],
-    b: Annotated[Path, typer.Argument(metavar="B", help="Log of another run.")],
+    a: Annotated[Path, typer.Argument(metavar="A", help="Log of a run.", parser=log_path)],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Log of another run.", parser=log_path)],
     as_json: AsJson = False,
 ) -> None:
     """Compare two logs: settings, provenance, and every quantity of every step.
