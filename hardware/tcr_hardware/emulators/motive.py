@@ -20,11 +20,10 @@ from tcr_hardware.emulators.motive_encoder import Stamp, Version
 from tcr_hardware.emulators.motive_faults import MotiveFaults
 from tcr_hardware.emulators.motive_link import Client, MotiveLink
 from tcr_hardware.emulators.motive_outbox import Outbox
-from tcr_hardware.emulators.motive_requests import answer
+from tcr_hardware.emulators.motive_requests import CLOCK_HZ, answer
 from tcr_hardware.emulators.motive_scene import Scene, View
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 
-CLOCK_HZ = 10_000_000
 FRAMEOFDATA, DISCONNECTBYTIMEOUT = 7, 11
 MODELS_CHANGED, BITSTREAM_CHANGED = 0x02, 0x08
 #: A change is flagged in so many frames, that one lost packet does not hide it.
