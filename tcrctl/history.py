@@ -20,7 +20,7 @@ from tcrctl.errors import InputError, TcrctlError
 from tcrctl.log.geometry import NODES_PER_MODULE
 from tcrctl.log.reader import Log, read_log
 from tcrctl.provenance import ROBOT
-from tcrctl.run_folder import LOG, RESOLVED
+from tcrctl.run_folder import RESOLVED, log_in
 from tcrctl.signals import Array
 
 _COLUMNS: Final = (
@@ -167,7 +167,7 @@ def read_histories(
     """
     if labels and len(labels) != len(paths):
         raise InputError(f"{len(labels)} labels for {len(paths)} logs; give one per log, or none")
-    logs = [read_log(path / LOG if path.is_dir() else path) for path in paths]
+    logs = [read_log(log_in(path)) for path in paths]
     names = labels or _labels(logs)
     return [_history(log, name, begin, end) for log, name in zip(logs, names, strict=True)]
 

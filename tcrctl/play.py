@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from tcrctl.errors import InputError
-from tcrctl.run_folder import LOG
+from tcrctl.run_folder import log_in
 from tcrctl.view.server import HOST, PORT, ViewServer, foxglove_sdk
 from tcrctl.view.tape import Sent, Tape
 
@@ -212,7 +212,7 @@ def play(
         LogError: If the log is damaged inside.
     """
     foxglove_sdk()
-    tape = Tape(path / LOG if path.is_dir() else path, playback.topics)
+    tape = Tape(log_in(path), playback.topics)
     player = Player(tape, playback, check=check)
     with ViewServer(
         tape.channels,

@@ -19,6 +19,11 @@ SUMMARY: Final = "summary.json"
 _TRIES: Final = 20
 
 
+def log_in(path: Path) -> Path:
+    """Path of a log that is given itself or by the folder of its run."""
+    return path / LOG if path.is_dir() else path
+
+
 def check_writable(out: Path) -> None:
     """Find out, before any work is done, whether run folders can be made in ``out``; changes nothing.
 

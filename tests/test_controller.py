@@ -15,7 +15,13 @@ from tcrctl.controller.controller import build_controller
 from tcrctl.controller.cost import outputs
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.multi_step import MultiStep
-from tcrctl.controller.settings import CostWeights, IntegralSettings, IocSettings, KinematicSettings
+from tcrctl.controller.settings import (
+    CostWeights,
+    IntegralSettings,
+    IocSettings,
+    KinematicSettings,
+    OffsetSettings,
+)
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.plant.settings import Mismatch, SimulatedSettings
@@ -157,8 +163,8 @@ def test_same_inputs_give_the_same_bytes(tcr700):
 
 
 def test_it_goes_to_the_target_and_stays(tcr600):
-    settings = ioc(weights=CostWeights(speed_change=220.0))  # as for the letters
-    errors, _, infos = closed_loop(tcr600, settings, (0.02, 0.0, 0.04), 10.0)
+    settings = ioc(weights=CostWeights(speed_change=220.0), offset=OffsetSettings(filter_s=0.5))
+    errors, _, infos = closed_loop(tcr600, settings, (0.02, 0.0, 0.04), 8.0)
     assert all(info.converged for info in infos)
     assert errors[-20:].max() < 1e-4
 

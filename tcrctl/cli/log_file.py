@@ -7,11 +7,12 @@ from typing import Annotated, TypeAlias
 
 import typer
 
+from tcrctl.run_folder import log_in
+
 
 def log_path(text: str) -> Path:
-    """Path of a log given itself or by the folder of its run."""
-    path = Path(text)
-    return path / "log.mcap" if path.is_dir() else path
+    """Read an argument that names a log, or the folder of its run."""
+    return log_in(Path(text))
 
 
 LogFile: TypeAlias = Annotated[
