@@ -22,10 +22,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import records
 
+from tcrctl.experiment.spec import LogSettings
 from tcrctl.log.viewer_topics import ViewerTopics
 from tcrctl.log.writer import LogWriter
 from tcrctl.signals import StepRecord
-from tcrctl.spec import LogSettings
 
 N_MODULES, N_CABLES, N_RECORDS = 13, 6, 400
 

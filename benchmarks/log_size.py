@@ -18,10 +18,10 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("NUMBA_OPT", "1")
 
-from tcrctl.experiment import prepare
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.run import run_experiment
+from tcrctl.experiment.spec import load_spec
 from tcrctl.replay.replay import replay
-from tcrctl.run import run_experiment
-from tcrctl.spec import load_spec
 
 #: Time of cone_frustum outside its turns, and of one turn [s].
 REST_S, TURN_S = 30.0, 25.0

@@ -23,14 +23,14 @@ from rich.console import Console
 from rich.table import Table
 
 from tcrctl.errors import InfeasibleError, NoEquilibriumError
-from tcrctl.experiment import build_plant, plan, prepare
-from tcrctl.feasibility import DriveLimits, check_feasibility
+from tcrctl.experiment.feasibility import DriveLimits, check_feasibility
+from tcrctl.experiment.prepare import build_plant, plan, prepare
+from tcrctl.experiment.spec import load_spec
 from tcrctl.robot import pose
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.equilibrium import equilibrium
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.signals import Array
-from tcrctl.spec import load_spec
 from tcrctl.trajectory.pose_settings import WaypointSettings, WaypointsSettings
 
 SHORTEST_S, LONGEST_S = 20.0, 60.0

@@ -10,12 +10,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 os.environ.setdefault("NUMBA_OPT", "1")
 
 from tcrctl.errors import TcrctlError
-from tcrctl.experiment import Experiment, build_parts, build_plant, prepare
-from tcrctl.loop import run_loop
-from tcrctl.metrics import Metrics
-from tcrctl.pacing import Unpaced
-from tcrctl.spec import LoadedSpec, load_spec
-from tcrctl.summary import Measures
+from tcrctl.experiment.metrics import Metrics
+from tcrctl.experiment.prepare import Experiment, build_parts, build_plant, prepare
+from tcrctl.experiment.spec import LoadedSpec, load_spec
+from tcrctl.experiment.summary import Measures
+from tcrctl.loop.loop import run_loop
+from tcrctl.loop.pacing import Unpaced
 
 
 @dataclass(frozen=True)

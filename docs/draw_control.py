@@ -11,11 +11,11 @@ from tempfile import TemporaryDirectory
 
 os.environ.setdefault("NUMBA_OPT", "1")  # as the command line does
 
-from tcrctl.experiment import prepare
-from tcrctl.history import read_histories
+from tcrctl.analysis.history import read_histories
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.run import run_experiment
+from tcrctl.experiment.spec import load_spec
 from tcrctl.plots import draw, save
-from tcrctl.run import run_experiment
-from tcrctl.spec import load_spec
 
 STIFF = tuple(
     f"plant.mismatch.{name}={factor}"

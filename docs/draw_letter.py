@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from tcrctl.history import read_histories
+from tcrctl.analysis.history import read_histories
 from tcrctl.plots import draw, save
 
 if __name__ == "__main__":

@@ -19,12 +19,12 @@ from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.modbus.registers import Control
 from tcrctl.errors import TcrctlError
-from tcrctl.pacing import RealTime
-from tcrctl.plant.bench import build_rig
-from tcrctl.plant.rig import RigPlant
-from tcrctl.plant.rig_file import LoadedRig
-from tcrctl.plant.rig_settings import RigFile
-from tcrctl.plant.session import Session
+from tcrctl.loop.pacing import RealTime
+from tcrctl.plant.rig.bench import build_rig
+from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.plant import RigPlant
+from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.settings import RigFile
 from tcrctl.robot.model import ring_rows
 from tcrctl.signals import Command
 

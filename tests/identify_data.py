@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcrctl import strict_yaml
+from tcrctl.config import strict_yaml
 from tcrctl.identify.loading import from_document
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.equilibrium import equilibrium

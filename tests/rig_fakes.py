@@ -8,11 +8,11 @@ import numpy as np
 from loop_fakes import Clock
 
 from tcrctl.errors import DeviceError
-from tcrctl.plant.devices import DriveControl, DriveStatus, Sighting
-from tcrctl.plant.rig import RigLimits, RigPlant
-from tcrctl.plant.session import Session
-from tcrctl.plant.set_points import AntagonistGroup, DriveEnvelope
-from tcrctl.plant.sight import Rules
+from tcrctl.plant.rig.devices import DriveControl, DriveStatus, Sighting
+from tcrctl.plant.rig.plant import RigLimits, RigPlant
+from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
+from tcrctl.plant.rig.sight import Rules
 from tcrctl.signals import RawFrame
 
 M, N = 3, 6

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tcrctl.spec import load_spec
+from tcrctl.experiment.spec import load_spec
 
 ROOT = Path(__file__).parents[1]
 SHORT = (

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from short_runs import ROOT, SHORT, arguments
 
-from tcrctl import shipped, strict_yaml
 from tcrctl.cli.app import main
-from tcrctl.experiment import prepare
+from tcrctl.config import shipped, strict_yaml
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.run import run_experiment
+from tcrctl.experiment.spec import load_spec
 from tcrctl.log.reader import read_log
-from tcrctl.run import run_experiment
-from tcrctl.spec import load_spec
 
 #: A test computer is busy; the figure of a real bench is tried in the fault matrix.
 WATCHDOG_MS = 1500

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tcrctl.numerics.bore import Bore, clearance, off_axis, plane_hit
 from tcrctl.numerics.rotation import normal_from_angles
+from tcrctl.task.bore import Bore, clearance, off_axis, plane_hit
 
 angle = st.floats(-0.3, 0.3)
 small = st.floats(-0.02, 0.02)

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from identify_data import CABLES, LONG, MASS, ROBOT, SPRINGS, static_data, true_robot
 
-from tcrctl import shipped, strict_yaml
 from tcrctl.cli.app import main
-from tcrctl.experiment import prepare
+from tcrctl.config import shipped, strict_yaml
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.run import run_experiment
+from tcrctl.experiment.spec import load_spec
 from tcrctl.robot.description import load_robot
-from tcrctl.run import run_experiment
-from tcrctl.spec import load_spec
 
 KEYS = {
     "status", "mean_error_before_mm", "mean_error_after_mm", "held_out_error_mm", "parameters", "unidentifiable",

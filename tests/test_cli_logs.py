@@ -13,12 +13,12 @@ import typer
 from log_files import open_log
 from typer.testing import CliRunner
 
+from tcrctl.analysis.export import export_csv, export_parquet
+from tcrctl.analysis.info import inspect
 from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.recover import recover
 from tcrctl.errors import InputError, LogError, TcrctlError
-from tcrctl.export import export_csv, export_parquet
-from tcrctl.info import inspect
 from tcrctl.log.columns import COLUMNS, meanings
 from tcrctl.log.reader import read_log
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from tcrctl import __version__, shipped, strict_yaml
+from tcrctl import __version__
 from tcrctl.cli import app
-from tcrctl.spec import ExperimentSpec, load_spec
+from tcrctl.config import shipped, strict_yaml
+from tcrctl.experiment.spec import ExperimentSpec, load_spec
 
 Output = pytest.CaptureFixture[str]
 

@@ -9,8 +9,8 @@ import pytest
 import records
 from log_files import STOP, open_log
 
+from tcrctl.analysis.diff import diff
 from tcrctl.cli.app import main
-from tcrctl.diff import diff
 
 N_STEPS = 30
 SPEC = b"name: a\ncontroller: {period_s: 0.05, weights: {position: 3.0e4}}\n"

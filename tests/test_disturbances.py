@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tcrctl.errors import SpecError
+from tcrctl.experiment.spec import load_spec
 from tcrctl.plant.disturbances import pushed, seen
 from tcrctl.plant.settings import DropoutSettings, PushSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
@@ -14,7 +15,6 @@ from tcrctl.robot.equilibrium import equilibrium
 from tcrctl.robot.model import FIXED, gravity_force
 from tcrctl.robot.robot import mismatched
 from tcrctl.signals import Command
-from tcrctl.spec import load_spec
 
 PERIOD = 0.05
 GRAVITY = np.array([0.0, 0.0, -9.81])

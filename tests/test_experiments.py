@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from tcrctl import shipped
 from tcrctl.cli.app import main
-from tcrctl.experiment import plan, prepare
-from tcrctl.spec import load_spec
+from tcrctl.config import shipped
+from tcrctl.experiment.prepare import plan, prepare
+from tcrctl.experiment.spec import load_spec
 
 NAMES = list(shipped.experiments())
 

@@ -12,10 +12,10 @@ import pytest
 from fault_matrix import BEFORE, CASES, PATIENT, Bench, Loop, bound, play, suite_cells, violations
 
 from tcr_hardware.modbus.registers import Status
+from tcrctl.commissioning.zero import reset_rig
 from tcrctl.errors import ArmingRefusedError, InputError, RigStopError
-from tcrctl.plant.bench import build_rig
-from tcrctl.plant.session import Session
-from tcrctl.rig.zero import reset_rig
+from tcrctl.plant.rig.bench import build_rig
+from tcrctl.plant.rig.session import Session
 
 #: What a busy computer may add to any time [s].
 LATE = 1.0

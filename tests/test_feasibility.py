@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tcrctl.errors import InfeasibleError
-from tcrctl.feasibility import INTERVAL, DriveLimits, check_feasibility
+from tcrctl.experiment.feasibility import INTERVAL, DriveLimits, check_feasibility
 from tcrctl.numerics.rotation import angle_between, normal_from_angles
 from tcrctl.robot import pose
 from tcrctl.robot.description import load_robot

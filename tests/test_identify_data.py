@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from identify_data import CABLES, ROBOT, SPRINGS, identification, static_data, true_robot
 
-from tcrctl import shipped, strict_yaml
+from tcrctl.config import shipped, strict_yaml
 from tcrctl.errors import InputError, SpecError, UnknownNameError
 from tcrctl.identify.certainty import Combination
 from tcrctl.identify.loading import load_identification

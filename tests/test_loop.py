@@ -10,10 +10,10 @@ import pytest
 from loop_fakes import CABLES, PERIOD, Clock, FakeController, FakeEstimator, FakePlant, StraightLine
 
 from tcrctl.errors import DeviceError, RunInterruptedError, SafetyLimitError, StoppedError
-from tcrctl.interruption import Interruption, signals_exit
-from tcrctl.loop import run_loop, step_count
-from tcrctl.pacing import LONGEST_NAP, RealTime, Unpaced
-from tcrctl.safety import SafetyLimits
+from tcrctl.loop.interruption import Interruption, signals_exit
+from tcrctl.loop.loop import run_loop, step_count
+from tcrctl.loop.pacing import LONGEST_NAP, RealTime, Unpaced
+from tcrctl.loop.safety import SafetyLimits
 
 LIMITS = SafetyLimits(position_error=0.06, tension=60.0)
 

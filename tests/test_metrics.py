@@ -12,11 +12,11 @@ import records
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tcrctl.criterion import parse_criterion
-from tcrctl.metrics import Metrics
+from tcrctl.experiment.criterion import parse_criterion
+from tcrctl.experiment.metrics import Metrics
+from tcrctl.experiment.summary import UNITS, Summary, judge
 from tcrctl.numerics.rotation import normal_from_angles
 from tcrctl.signals import RawFrame, Timing
-from tcrctl.summary import UNITS, Summary, judge
 
 UP = np.array([0.0, 0.0, 1.0])
 N = 50

@@ -6,22 +6,22 @@ from drawings import Section, law, parsed
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tcrctl.config.validation import check
 from tcrctl.controller.controller import build_controller
 from tcrctl.controller.settings import OpenLoopSettings
 from tcrctl.errors import InfeasibleError, InputError, SpecError
-from tcrctl.experiment import plan, prepare
-from tcrctl.feasibility import DriveLimits, check_drives
+from tcrctl.experiment.feasibility import DriveLimits, check_drives
+from tcrctl.experiment.prepare import plan, prepare
+from tcrctl.experiment.spec import load_spec
 from tcrctl.numerics.rotation import angle_between
 from tcrctl.robot import pose
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.equilibrium import equilibrium
 from tcrctl.robot.robot import build_robot
 from tcrctl.signals import Estimate
-from tcrctl.spec import load_spec
 from tcrctl.trajectory.drives import samples, time_law
 from tcrctl.trajectory.start_blend import StartBlend
 from tcrctl.trajectory.trajectory import build_trajectory, sample_reference
-from tcrctl.validation import check
 
 PERIOD = 0.05
 TABLE = {

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from tcrctl.cli.app import main
 from tcrctl.errors import RunInterruptedError, UnknownNameError
+from tcrctl.experiment.spec import load_spec
 from tcrctl.paper import paper
 from tcrctl.paper.checks import CHECKS
 from tcrctl.paper.job import Check, Run
@@ -27,7 +28,6 @@ from tcrctl.paper.report import TITLES, make_line, markdown
 from tcrctl.paper.row import Row, found, total, worst
 from tcrctl.paper.table import ROWS
 from tcrctl.paper.table2 import CONFIGURATIONS, measured_displacements, model_displacements
-from tcrctl.spec import load_spec
 
 
 @dataclass(frozen=True)

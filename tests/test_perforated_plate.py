@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tcrctl.numerics.perforated_plate import (
+from tcrctl.numerics.rotation import matrix_from_quaternion, quaternion_exp
+from tcrctl.task.perforated_plate import (
     Plates,
     blocks,
     crosses,
@@ -14,7 +15,6 @@ from tcrctl.numerics.perforated_plate import (
     point_distance,
     segment_distance,
 )
-from tcrctl.numerics.rotation import matrix_from_quaternion, quaternion_exp
 
 HALF = np.array([0.05, 0.04])
 HOLES = np.array([[0.012, 0.004, 0.02], [-0.03, -0.02, 0.01]])

@@ -13,17 +13,17 @@ from log_files import STOP, open_log
 from numpy.testing import assert_allclose
 from PIL import Image
 
-from tcrctl import provenance
+from tcrctl.analysis.history import Limits, orientation_angles, read_histories
+from tcrctl.analysis.skeleton import read_skeleton
 from tcrctl.cli.app import main
 from tcrctl.cli.plot import plot
 from tcrctl.errors import InputError, UnknownNameError
-from tcrctl.history import Limits, orientation_angles, read_histories
+from tcrctl.experiment import provenance
+from tcrctl.experiment.run import log_geometry
+from tcrctl.experiment.spec import load_spec
 from tcrctl.numerics.rotation import angle_between, angles_from_normal
 from tcrctl.plots import FIGURES, draw, save
 from tcrctl.robot.robot import Robot
-from tcrctl.run import log_geometry
-from tcrctl.skeleton import read_skeleton
-from tcrctl.spec import load_spec
 
 N_STEPS = 40
 SPEC = load_spec("letter_t", ["controller.speed_limit_mm_s=6"])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from drawings import REST, UP, built
 
+from tcrctl.experiment.spec import load_spec
 from tcrctl.numerics.rotation import angle_between
-from tcrctl.spec import load_spec
 from tcrctl.task.task import task_targets
 
 POSES = [

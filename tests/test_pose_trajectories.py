@@ -8,10 +8,10 @@ from drawings import REST, UP, Section, built, law, parsed
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from tcrctl.config.validation import check
 from tcrctl.numerics.rotation import angle_between, normal_from_angles
 from tcrctl.trajectory.pose_path import EndPose, StraightMove
 from tcrctl.trajectory.waypoints import legs, pose_of
-from tcrctl.validation import check
 
 H = 0.02
 HOME = EndPose(REST, UP)

@@ -8,8 +8,8 @@ import os
 import pytest
 
 from tcrctl.errors import LogError
-from tcrctl.plant.journal import Journal
-from tcrctl.quiet import quiet_interpreter
+from tcrctl.loop.quiet import quiet_interpreter
+from tcrctl.plant.rig.journal import Journal
 
 
 def test_the_garbage_collector_rests_inside_and_works_again_after():

@@ -15,7 +15,10 @@ from short_runs import short_spec
 
 from tcrctl.cli.app import main
 from tcrctl.errors import InputError, LogError
-from tcrctl.experiment import prepare
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.run import log_geometry, run_experiment
+from tcrctl.experiment.run_folder import RESOLVED
+from tcrctl.experiment.spec import load_spec
 from tcrctl.log.comparison import Comparison, Difference, quantities
 from tcrctl.log.reader import read_log
 from tcrctl.log.recover import recover
@@ -23,9 +26,6 @@ from tcrctl.log.writer import LogWriter
 from tcrctl.replay.figure import WhatIf
 from tcrctl.replay.replay import replay
 from tcrctl.replay.result import Tolerance, Window
-from tcrctl.run import log_geometry, run_experiment
-from tcrctl.run_folder import RESOLVED
-from tcrctl.spec import load_spec
 
 VARIANTS = {
     "full": (),
@@ -178,9 +178,9 @@ def test_a_weight_changed_by_1e_12_is_found_in_the_attachment_as_with_set(logs, 
 def test_a_replay_needs_no_file_but_the_log(logs, tmp_path, monkeypatch):
     path = rewritten(logs("full"), tmp_path / "copy.mcap")
     monkeypatch.setattr(
-        "tcrctl.shipped.find_robot", lambda *arguments: pytest.fail("looked for a robot file")
+        "tcrctl.config.shipped.find_robot", lambda *arguments: pytest.fail("looked for a robot file")
     )
-    monkeypatch.setattr("tcrctl.strict_yaml.read", lambda path: pytest.fail(f"read {path}"))
+    monkeypatch.setattr("tcrctl.config.strict_yaml.read", lambda path: pytest.fail(f"read {path}"))
     assert replay(path).status == "identical"
 
 

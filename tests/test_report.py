@@ -19,13 +19,13 @@ from log_files import STOP, open_log
 from numpy.testing import assert_allclose
 from PIL import Image
 
-from tcrctl import provenance
+from tcrctl.analysis.history import read_histories
 from tcrctl.cli.app import main
-from tcrctl.history import read_histories
+from tcrctl.experiment import provenance
+from tcrctl.experiment.spec import load_spec
 from tcrctl.log.reader import read_log
 from tcrctl.report import numbers as packing
 from tcrctl.report import write_report
-from tcrctl.spec import load_spec
 
 N_STEPS = 60
 EVIL = "</script><script>document.documentElement.dataset.evil = 1</script><img src=http://evil.test/x>"

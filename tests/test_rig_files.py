@@ -7,16 +7,16 @@ import re
 
 import pytest
 
-from tcrctl import shipped, strict_yaml
 from tcrctl.cli.app import main
 from tcrctl.cli.rig.verbs import RIG_VERBS
+from tcrctl.config import shipped, strict_yaml
 from tcrctl.errors import InputError, SpecError, UnknownNameError
-from tcrctl.plant.rig_file import load_rig, read_rig
-from tcrctl.plant.rig_settings import RigFile
+from tcrctl.experiment.provenance import attachments
+from tcrctl.experiment.spec import ExperimentSpec, load_spec
+from tcrctl.plant.rig.file import load_rig, read_rig
+from tcrctl.plant.rig.settings import RigFile
 from tcrctl.plant.settings import RigSettings
-from tcrctl.provenance import attachments
 from tcrctl.robot.description import load_robot
-from tcrctl.spec import ExperimentSpec, load_spec
 
 LOOPBACK = ("plant.kind=rig", "plant.rig=loopback")
 

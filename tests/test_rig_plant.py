@@ -13,7 +13,7 @@ from tcrctl.errors import (
     StoppedError,
     UntrustworthyDeviceError,
 )
-from tcrctl.plant.devices import DriveControl
+from tcrctl.plant.rig.devices import DriveControl
 from tcrctl.signals import Command
 
 

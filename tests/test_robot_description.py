@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tcrctl import shipped, strict_yaml
+from tcrctl.config import shipped, strict_yaml
 from tcrctl.errors import InputError, SpecError, UnknownNameError
 from tcrctl.robot.description import RobotDescription, cable_routes, load_robot, spring_list
 

@@ -17,19 +17,19 @@ from log_files import doctor
 from numba.core.dispatcher import Dispatcher
 from short_runs import ROOT, SHORT, arguments, short_spec, start
 
+from tcrctl.analysis.info import inspect
 from tcrctl.cli.app import main
 from tcrctl.controller.instantaneous import InstantaneousOptimalControl
 from tcrctl.errors import DeviceError, DivergenceError, InputError, LogError
-from tcrctl.experiment import prepare
-from tcrctl.info import inspect
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.run import run_experiment
+from tcrctl.experiment.run_folder import make_run_folder
+from tcrctl.experiment.spec import load_spec
 from tcrctl.log.reader import read_log
 from tcrctl.log.recover import recover
 from tcrctl.log.writer import LogWriter
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.replay.replay import replay
-from tcrctl.run import run_experiment
-from tcrctl.run_folder import make_run_folder
-from tcrctl.spec import load_spec
 
 
 @pytest.fixture(scope="module")
@@ -135,8 +135,8 @@ def test_no_kernel_is_compiled_or_loaded_during_a_run(tmp_path):
         "from pathlib import Path\n"
         "from short_runs import short_spec\n"
         "from test_run import loaded_kernels\n"
-        "from tcrctl.experiment import prepare, plan\n"
-        "from tcrctl.run import run_experiment\n"
+        "from tcrctl.experiment.prepare import prepare, plan\n"
+        "from tcrctl.experiment.run import run_experiment\n"
         "made = prepare(short_spec())\n"
         "before = loaded_kernels()\n"
         "run_experiment(made, out=Path(sys.argv[3]))\n"

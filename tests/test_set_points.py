@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rig_fakes import HIGH, LOW, PERIOD, STEP, M, envelope
 
-from tcrctl.plant.set_points import SetPoints
+from tcrctl.plant.rig.set_points import SetPoints
 
 GROUP_LOW, GROUP_HIGH = -15_000, 60_000
 SPEEDS = st.lists(

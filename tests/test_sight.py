@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from tcrctl.numerics.sight import hides, in_view
+from tcrctl.task.sight import hides, in_view
 
 coordinate = st.floats(-0.1, 0.1)
 points = st.tuples(coordinate, coordinate, coordinate).map(np.array)

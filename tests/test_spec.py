@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from tcrctl import shipped, strict_yaml
-from tcrctl.criterion import RELATIONS, Criterion, CriterionText
+from tcrctl.config import shipped, strict_yaml
 from tcrctl.errors import InputError, SpecError, UnknownNameError
-from tcrctl.spec import ExperimentSpec, LoadedSpec, load_spec
+from tcrctl.experiment.criterion import RELATIONS, Criterion, CriterionText
+from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, load_spec
 
 SPEC = """\
 name: standing

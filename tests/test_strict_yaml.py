@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field
 
-from tcrctl import strict_yaml
+from tcrctl.config import strict_yaml
+from tcrctl.config.settings import OrOff, Settings, refuse
 from tcrctl.errors import InputError, SpecError
-from tcrctl.settings import OrOff, Settings, refuse
 
 numbers = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(10**30), 10**30)
 words = st.text(

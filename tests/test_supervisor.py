@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from rig_fakes import RULES
 
 from tcrctl.errors import ArmingRefusedError, DeviceError, RigStopError
-from tcrctl.plant.devices import DriveControl, DriveStatus
-from tcrctl.plant.sight import Sight
-from tcrctl.plant.supervisor import State, Supervisor
+from tcrctl.plant.rig.devices import DriveControl, DriveStatus
+from tcrctl.plant.rig.sight import Sight
+from tcrctl.plant.rig.supervisor import State, Supervisor
 
 WELL = DriveStatus(np.zeros(3, np.int64), enabled=True, zeroed=True)
 GOOD = Sight(age=0.004, status=WELL)

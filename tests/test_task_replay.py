@@ -7,9 +7,9 @@ import json
 from test_task_specs import BELOW
 
 from tcrctl.cli.app import main
-from tcrctl.experiment import prepare
-from tcrctl.run import run_experiment
-from tcrctl.spec import load_spec
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.run import run_experiment
+from tcrctl.experiment.spec import load_spec
 
 
 def test_what_if_on_a_log_whose_trajectory_goes_to_a_target(tmp_path, capsys):

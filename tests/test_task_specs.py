@@ -6,13 +6,13 @@ import json
 
 import pytest
 
-from tcrctl import strict_yaml
 from tcrctl.cli.app import main
+from tcrctl.config import strict_yaml
 from tcrctl.errors import SpecError
-from tcrctl.experiment import prepare
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.run import run_experiment
+from tcrctl.experiment.spec import load_spec
 from tcrctl.log.reader import read_log
-from tcrctl.run import run_experiment
-from tcrctl.spec import load_spec
 
 #: A pipe below the rest pose: the end is at its target almost from the start.
 BELOW = (

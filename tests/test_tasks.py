@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from pydantic import RootModel
 from records import record
 
-from tcrctl.numerics.perforated_plate import blocks, nearest
 from tcrctl.numerics.rotation import matrix_from_quaternion, quaternion_exp
 from tcrctl.robot import pose
 from tcrctl.signals import Reference, Truth
 from tcrctl.task.body import SIDES, segment_name, segments
 from tcrctl.task.box import box_from_markers, hole_target
+from tcrctl.task.perforated_plate import blocks, nearest
 from tcrctl.task.pipe import pipe_from_markers
 from tcrctl.task.settings import WALLS, TaskSettings
 from tcrctl.task.task import build_task, task_targets

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from drawings import DT, EXPERIMENTS, LETTERS, REST, UP, Section, built, drawing, in_plane_mm, parsed, sampled
 
-from tcrctl import strict_yaml
+from tcrctl.config import strict_yaml
+from tcrctl.config.validation import check
 from tcrctl.trajectory.strokes import moves
 from tcrctl.trajectory.trajectory import sample_reference
-from tcrctl.validation import check
 
 
 @pytest.mark.parametrize("name", LETTERS)

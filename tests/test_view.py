@@ -21,11 +21,11 @@ from viewer_client import ViewerClient, digest
 
 from tcrctl.cli.app import main
 from tcrctl.errors import InputError, RunInterruptedError, UnknownNameError
-from tcrctl.experiment import prepare
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.run import run_experiment
 from tcrctl.log.viewer_topics import TOPICS
-from tcrctl.play import Playback, Player, play
-from tcrctl.run import run_experiment
 from tcrctl.view.live import LiveView
+from tcrctl.view.play import Playback, Player, play
 from tcrctl.view.tape import Tape
 
 N_STEPS = 60

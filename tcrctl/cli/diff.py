@@ -13,7 +13,7 @@ from tcrctl.cli.log_file import log_path
 from tcrctl.cli.options import AsJson
 
 if TYPE_CHECKING:
-    from tcrctl.diff import Entry, LogDiff
+    from tcrctl.analysis.diff import Entry, LogDiff
 
 
 def diff(
@@ -30,7 +30,7 @@ def diff(
       tcrctl diff before/log.mcap after/log.mcap
       tcrctl diff a.mcap b.mcap --json | jq '.settings[].key'
     """
-    from tcrctl.diff import diff as compare
+    from tcrctl.analysis.diff import diff as compare
 
     found = compare(a, b)
     if as_json:

@@ -50,7 +50,7 @@ def emulate(
       tcrctl emulate --faults estop.yaml
     """
     from tcrctl.errors import RunInterruptedError
-    from tcrctl.interruption import Interruption, signals_exit
+    from tcrctl.loop.interruption import Interruption, signals_exit
 
     with signals_exit():
         bench, script = _built(rig, faults, perfect, rate_hz, watchdog_ms)
@@ -76,10 +76,10 @@ def emulate(
 def _built(
     rig: str, faults: Path | None, perfect: bool, rate_hz: float, watchdog_ms: int
 ) -> tuple[EmulatedBench, FaultScript | None]:
-    from tcrctl.compilation import announced_compilation
     from tcrctl.emulate.bench import EmulatedBench, EmulationSettings, marker_names
     from tcrctl.emulate.fault_script import load_fault_script
-    from tcrctl.plant.rig_file import read_rig
+    from tcrctl.experiment.compilation import announced_compilation
+    from tcrctl.plant.rig.file import read_rig
 
     file, *_ = read_rig(rig)
     script = None if faults is None else load_fault_script(faults, file.robots, marker_names(file))

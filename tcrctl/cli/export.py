@@ -58,8 +58,8 @@ def export(
       tcrctl export --columns
     """
     del columns
+    from tcrctl.analysis.export import export_csv, export_npz, export_parquet
     from tcrctl.errors import InputError
-    from tcrctl.export import export_csv, export_npz, export_parquet
 
     if as_csv + as_npz + as_parquet != 1:
         raise InputError("give one format: --csv, --npz or --parquet")

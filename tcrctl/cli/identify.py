@@ -82,12 +82,12 @@ def identify(
                       --params springs.youngs_modulus_mpa,cables.youngs_modulus_mpa
       tcrctl run helix --set robot=logs/TIME_NAME_ID/robot.yaml
     """
-    from tcrctl.interruption import signals_exit
+    from tcrctl.loop.interruption import signals_exit
 
     say = (lambda text: None) if quiet else _say
     changes = [*(overrides or ()), *_assignments(method, strung_by, seed)]
     with signals_exit():
-        from tcrctl.run_folder import check_writable
+        from tcrctl.experiment.run_folder import check_writable
 
         check_writable(out)
         loaded = _loaded(inputs or [], data, robot, params, changes)
@@ -137,7 +137,7 @@ def _loaded(
 
 def _from_data(data: list[str], robot: str, params: str, changes: list[str]) -> LoadedIdentification:
     """An identification that was told on the command line."""
-    from tcrctl import strict_yaml
+    from tcrctl.config import strict_yaml
     from tcrctl.identify.loading import from_document
 
     told: dict[str, Any] = {

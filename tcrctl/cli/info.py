@@ -9,7 +9,7 @@ from tcrctl.cli.log_file import LogFile
 from tcrctl.cli.options import AsJson
 
 if TYPE_CHECKING:
-    from tcrctl.info import LogInfo, Spread
+    from tcrctl.analysis.info import LogInfo, Spread
 
 
 def info(log: LogFile, as_json: AsJson = False) -> None:
@@ -19,7 +19,7 @@ def info(log: LogFile, as_json: AsJson = False) -> None:
       tcrctl info logs/latest/log.mcap
       tcrctl info log.mcap --json | jq .control_ms.p99
     """
-    from tcrctl.info import inspect
+    from tcrctl.analysis.info import inspect
 
     found = inspect(log)
     if as_json:

@@ -17,7 +17,7 @@ def list_shipped(as_json: AsJson = False) -> None:
       tcrctl list
       tcrctl list --json | jq -r '.experiments[].name'
     """
-    from tcrctl import shipped
+    from tcrctl.config import shipped
 
     experiments = [
         _entry(name, path, ("description", "robot", "source")) for name, path in shipped.experiments().items()
@@ -50,7 +50,7 @@ def list_shipped(as_json: AsJson = False) -> None:
 
 def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:
     """Return some text values of a file that may be invalid, without validating it."""
-    from tcrctl import strict_yaml
+    from tcrctl.config import strict_yaml
     from tcrctl.errors import InputError
 
     try:

@@ -7,7 +7,7 @@ from typing import Annotated, TypeAlias
 
 import typer
 
-from tcrctl.run_folder import log_in
+from tcrctl.experiment.run_folder import log_in
 
 
 def log_path(text: str) -> Path:

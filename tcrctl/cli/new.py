@@ -23,7 +23,7 @@ def new(
       tcrctl new studies/slow.yaml --from letter_i
     """
     from tcrctl.errors import DeviceError, InputError
-    from tcrctl.spec import load_spec
+    from tcrctl.experiment.spec import load_spec
 
     path = Path(name if name.endswith((".yaml", ".yml")) else f"{name}.yaml")
     loaded = load_spec(start)
@@ -42,8 +42,8 @@ def new(
 
 
 def _renamed(text: str, path: Path, start: str) -> str:
-    from tcrctl import strict_yaml
-    from tcrctl.spec import ExperimentSpec
+    from tcrctl.config import strict_yaml
+    from tcrctl.experiment.spec import ExperimentSpec
 
     text = _with_value(text, "name", path.stem)
     text = _with_value(text, "source", f"started from {Path(start).stem}")

@@ -57,8 +57,8 @@ def paper(
       tcrctl paper --only letters --only table2
       tcrctl paper --json --jobs 4 | jq '.rows[] | {name, measured, verdict}'
     """
+    from tcrctl.experiment.run_folder import check_writable
     from tcrctl.paper.paper import choose, jobs_of, run_paper
-    from tcrctl.run_folder import check_writable
 
     chosen = choose(only or ())
     if rows:

@@ -46,9 +46,9 @@ def play(
       tcrctl play log.mcap --rate 5 --from 10 --loop
     """
     from tcrctl.errors import RunInterruptedError
-    from tcrctl.interruption import Interruption
-    from tcrctl.play import Playback
-    from tcrctl.play import play as play_log
+    from tcrctl.loop.interruption import Interruption
+    from tcrctl.view.play import Playback
+    from tcrctl.view.play import play as play_log
 
     playback = Playback(rate, begin, end, loop, paused, once, topics or ())
     with Interruption() as interruption:

@@ -55,7 +55,7 @@ def plot(
       tcrctl plot static/log.mcap dynamic/log.mcap --label static --label dynamic
       tcrctl plot log.mcap -f tensions --from 10 --to 20
     """
-    from tcrctl.history import read_histories
+    from tcrctl.analysis.history import read_histories
     from tcrctl.plots import FIGURES, check_names, save_figures
 
     names = list(dict.fromkeys(figures or FIGURES))

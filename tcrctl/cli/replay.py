@@ -66,7 +66,7 @@ def replay(
       tcrctl replay log.mcap --set controller.horizon_s=1.0 --plot longer.png
       tcrctl replay log.mcap --from 100 --to 200 --rtol 1e-9 --json
     """
-    from tcrctl.compilation import announced_compilation
+    from tcrctl.experiment.compilation import announced_compilation
     from tcrctl.replay.figure import WhatIf, check_format, save
     from tcrctl.replay.replay import replay as run_replay
     from tcrctl.replay.result import Tolerance, checked_window

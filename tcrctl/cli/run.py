@@ -15,11 +15,11 @@ from tcrctl.cli.options import AsJson, Overrides, Spec
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from tcrctl.experiment import Experiment, Notify
-    from tcrctl.feasibility import StaticPath
+    from tcrctl.experiment.feasibility import StaticPath
+    from tcrctl.experiment.prepare import Experiment, Notify
+    from tcrctl.experiment.spec import LoadedSpec
+    from tcrctl.experiment.summary import Summary
     from tcrctl.log.mcap_file import Tap
-    from tcrctl.spec import LoadedSpec
-    from tcrctl.summary import Summary
 
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Check everything, move nothing, write nothing.")]
 RealTime = Annotated[bool, typer.Option("--realtime", help="Pace a simulated plant by the clock.")]
@@ -70,8 +70,8 @@ def run(
       tcrctl run letter_t --set plant.kind=rig --set plant.rig=loopback   (see: tcrctl emulate --help)
     """
     from tcrctl.cli.consent import ask, check_can_ask
-    from tcrctl.interruption import signals_exit
-    from tcrctl.spec import load_spec
+    from tcrctl.experiment.spec import load_spec
+    from tcrctl.loop.interruption import signals_exit
 
     say: Notify = _nothing if quiet else _say
     with ExitStack() as viewing:
@@ -86,7 +86,7 @@ def run(
                 _get_ready(out)
             served = _live_view(loaded, view_host, view_port, say) if view and not dry_run else nullcontext()
             tap = viewing.enter_context(served)
-            from tcrctl.experiment import prepare
+            from tcrctl.experiment.prepare import prepare
 
             experiment = prepare(loaded, seed=seed, notify=say)
             path = _planned(experiment, force, say)
@@ -108,10 +108,10 @@ def run(
 
 def _get_ready(out: Path) -> None:
     """Do what a run needs, before the seconds that preparation takes."""
-    from tcrctl.run_folder import check_writable
+    from tcrctl.experiment.run_folder import check_writable
 
     check_writable(out)
-    import tcrctl.run  # noqa: F401  (later a signal shall find it loaded)
+    import tcrctl.experiment.run  # noqa: F401  (later a signal shall find it loaded)
 
 
 @contextmanager
@@ -129,7 +129,7 @@ def _live_view(loaded: LoadedSpec, host: str, port: int, say: Notify) -> Iterato
 def _run(
     experiment: Experiment, out: Path, realtime: bool, say: Notify, tap: Tap | None, *, quiet: bool
 ) -> Summary:
-    from tcrctl.run import run_experiment
+    from tcrctl.experiment.run import run_experiment
 
     with progress_bar(experiment.spec.name, shown=not quiet) as progress:
         return run_experiment(
@@ -143,7 +143,7 @@ def _length(experiment: Experiment) -> str:
 
 def _planned(experiment: Experiment, force: bool, say: Notify) -> StaticPath | None:
     from tcrctl.errors import InfeasibleError
-    from tcrctl.experiment import plan
+    from tcrctl.experiment.prepare import plan
 
     if force:
         say("warning: --force: feasibility is not checked")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tcrctl.summary import Numbers, Summary
+    from tcrctl.experiment.summary import Numbers, Summary
 
 Row = tuple[str, str, str]
 

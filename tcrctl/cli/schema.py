@@ -24,12 +24,12 @@ def schema(
     and as the first line of an experiment file:
       # yaml-language-server: $schema=tcrctl.schema.json
     """
+    from tcrctl.config.settings import Settings
     from tcrctl.errors import InputError
+    from tcrctl.experiment.spec import ExperimentSpec
     from tcrctl.identify.settings import IdentificationSpec
-    from tcrctl.plant.rig_settings import RigFile
+    from tcrctl.plant.rig.settings import RigFile
     from tcrctl.robot.description import RobotDescription
-    from tcrctl.settings import Settings
-    from tcrctl.spec import ExperimentSpec
 
     kinds: list[tuple[bool, type[Settings]]] = [
         (robot, RobotDescription),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tcrctl.cli.options import AsJson, IsRobot, Overrides, Spec
 
 if TYPE_CHECKING:
-    from tcrctl.settings import Settings
+    from tcrctl.config.settings import Settings
 
 
 def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_json: AsJson = False) -> None:
@@ -19,7 +19,7 @@ def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_jso
       tcrctl show letter_t --set controller.tension=off --json
       tcrctl show --robot tcr700
     """
-    from tcrctl import strict_yaml
+    from tcrctl.config import strict_yaml
 
     found = _found(spec, overrides or (), robot=robot)
     if as_json:
@@ -29,9 +29,9 @@ def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_jso
 
 
 def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
-    from tcrctl import shipped
+    from tcrctl.config import shipped
+    from tcrctl.experiment.spec import load_spec
     from tcrctl.robot.description import load_robot
-    from tcrctl.spec import load_spec
 
     if robot:
         return load_robot(name, overrides=overrides)

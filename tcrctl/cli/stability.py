@@ -60,12 +60,12 @@ def stability(
     """
     _check_file(out, TABLES, force)
     _check_file(figure, FIGURES, force)
-    from tcrctl.interruption import signals_exit
-    from tcrctl.spec import load_spec
+    from tcrctl.experiment.spec import load_spec
+    from tcrctl.loop.interruption import signals_exit
 
     with signals_exit():
         loaded = load_spec(spec, overrides or ())
-        from tcrctl.experiment import prepare
+        from tcrctl.experiment.prepare import prepare
         from tcrctl.stability.analysis import analyse
 
         experiment = prepare(loaded, notify=_nothing if quiet else _say)

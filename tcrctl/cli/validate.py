@@ -48,9 +48,9 @@ def validate(
 
 def _load(name: str, overrides: Sequence[str], *, robot: bool) -> None:
     """Read a file of any kind with all its checks."""
-    from tcrctl import shipped
+    from tcrctl.config import shipped
+    from tcrctl.experiment.spec import load_spec
     from tcrctl.robot.description import load_robot
-    from tcrctl.spec import load_spec
 
     if robot:
         load_robot(name, overrides=overrides)

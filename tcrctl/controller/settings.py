@@ -7,7 +7,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
-from tcrctl.settings import OrOff, Path, Settings, quantity, refuse
+from tcrctl.config.settings import OrOff, Path, Settings, quantity, refuse
 
 
 class CostWeights(Settings):

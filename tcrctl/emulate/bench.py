@@ -29,8 +29,8 @@ from tcr_hardware.rigid_transform import RigidTransform
 from tcrctl.emulate.fault_script import FaultScript, Player
 from tcrctl.emulate.robot import EmulatedRobot
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.plant.natnet_cameras import transform
-from tcrctl.plant.rig_settings import CableDrive, ModbusTcp, MountedRobot, RigFile
+from tcrctl.plant.rig.natnet_cameras import transform
+from tcrctl.plant.rig.settings import CableDrive, ModbusTcp, MountedRobot, RigFile
 from tcrctl.plant.settings import Mismatch
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.robot import Robot, build_robot

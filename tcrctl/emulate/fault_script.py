@@ -25,10 +25,10 @@ from tcr_hardware.emulators.motive_faults import MotiveFaults
 from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.emulators.plc_faults import FAULTS
 from tcr_hardware.modbus.registers import Status
-from tcrctl import strict_yaml
+from tcrctl.config import strict_yaml
+from tcrctl.config.settings import Path as Keys
+from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.errors import Problem, SpecError
-from tcrctl.settings import Path as Keys
-from tcrctl.settings import Settings, quantity, refuse
 
 _DEFAULTS = MotiveFaults()
 _CHANGES = {"version": "", "renamed": False}

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from tcrctl.settings import Settings, quantity
+from tcrctl.config.settings import Settings, quantity
 
 
 class PassiveObserverSettings(Settings):

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.compilation import announced_compilation
 from tcrctl.errors import RunInterruptedError
+from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.identify.best import Best
 from tcrctl.identify.building import assumed_forces, build_problem, choose_frame
 from tcrctl.identify.certainty import Certainty, certainty
@@ -23,7 +23,7 @@ from tcrctl.identify.polish import Residuals, polish
 from tcrctl.identify.problem import MM, Problem, distances
 from tcrctl.identify.result import Group, Result, Stage
 from tcrctl.identify.swarm import search
-from tcrctl.interruption import Interruption
+from tcrctl.loop.interruption import Interruption
 from tcrctl.signals import Array
 
 #: Change of assumed forces for their sensitivity, relative.

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from tcrctl import shipped, strict_yaml
+from tcrctl.config import shipped, strict_yaml
+from tcrctl.config.settings import Path as Keys
 from tcrctl.errors import Problem, SpecError
 from tcrctl.identify.parameters import DEFAULT_FACTOR, Parameter, look_up, split, with_values
 from tcrctl.identify.settings import DataSettings, IdentificationSpec, ParameterSettings
 from tcrctl.identify.static_data import Configuration, read_static
 from tcrctl.robot.description import RobotDescription
-from tcrctl.settings import Path as Keys
 
 LOG_SUFFIX = ".mcap"
 

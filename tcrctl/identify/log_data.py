@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tcrctl import strict_yaml
+from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError
+from tcrctl.experiment.provenance import ROBOT
 from tcrctl.identify.loading import LogSource
 from tcrctl.identify.points import node_rows
 from tcrctl.log.reader import Log, read_log
-from tcrctl.provenance import ROBOT
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.robot import build_robot
 from tcrctl.signals import Array

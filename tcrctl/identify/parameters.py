@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from tcrctl.config.settings import Path as Keys
 from tcrctl.robot.description import RobotDescription
-from tcrctl.settings import Path as Keys
 from tcrctl.signals import Array
 
 #: How far default bounds reach from the robot's own value.

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from tcrctl import strict_yaml
+from tcrctl.config import strict_yaml
+from tcrctl.experiment.provenance import ROBOT, versions
+from tcrctl.experiment.run_folder import RESOLVED, SPEC, make_run_folder
 from tcrctl.identify.figure import save_figure
 from tcrctl.identify.loading import LoadedIdentification
 from tcrctl.identify.result import Result
 from tcrctl.identify.robot_file import robot_text
-from tcrctl.provenance import ROBOT, versions
-from tcrctl.run_folder import RESOLVED, SPEC, make_run_folder
 
 REPORT = "report.json"
 FIGURE = "figure.png"

@@ -9,7 +9,8 @@ from typing import Any
 import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from tcrctl import __version__, strict_yaml
+from tcrctl import __version__
+from tcrctl.config import strict_yaml
 from tcrctl.errors import SpecError
 from tcrctl.identify.parameters import split, with_values
 from tcrctl.identify.result import Result

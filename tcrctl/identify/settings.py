@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from tcrctl.config.settings import Path, Settings, quantity, refuse
 from tcrctl.robot.sections import Name, Vector
-from tcrctl.settings import Path, Settings, quantity, refuse
 
 Method = Literal["pso+least-squares", "pso", "least-squares"]
 

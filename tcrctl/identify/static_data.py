@@ -14,13 +14,13 @@ from pathlib import Path
 
 from pydantic import Field, model_validator
 
-from tcrctl import strict_yaml
+from tcrctl.config import strict_yaml
+from tcrctl.config.settings import Path as Keys
+from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.errors import Problem, SpecError
 from tcrctl.identify.points import node_rows
 from tcrctl.identify.table_data import read_table
 from tcrctl.robot.description import RobotDescription, cable_routes
-from tcrctl.settings import Path as Keys
-from tcrctl.settings import Settings, quantity, refuse
 
 Coordinates = tuple[float | None, float | None, float | None]
 UNKNOWN: Coordinates = (None, None, None)

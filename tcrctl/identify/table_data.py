@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tcrctl.config.strict_yaml import Document, Keys, placed, read
 from tcrctl.errors import Problem, SpecError
-from tcrctl.strict_yaml import Document, Keys, placed, read
 
 _POINT = ("point", "x_mm", "y_mm", "z_mm")
 

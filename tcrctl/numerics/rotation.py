@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..signals import Array
+from tcrctl.signals import Array
 
 SMALL = 1e-5  # below, sin(x)/x and its inverse are 1 -+ x^2/6 to machine precision
 

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from tcrctl.errors import RunInterruptedError, UnknownNameError
+from tcrctl.experiment.provenance import versions
+from tcrctl.experiment.run_folder import RunFolder, make_run_folder
 from tcrctl.paper.job import Job
 from tcrctl.paper.processes import Done, Processes
 from tcrctl.paper.report import BAD, Line, make_line, markdown
 from tcrctl.paper.row import Row
 from tcrctl.paper.table import ROWS
-from tcrctl.provenance import versions
-from tcrctl.run_folder import RunFolder, make_run_folder
 
 MARKDOWN: Final = "paper.md"
 JSON: Final = "paper.json"

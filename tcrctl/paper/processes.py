@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from tcrctl.interruption import Interruption
+from tcrctl.loop.interruption import Interruption
 from tcrctl.paper.job import Job
 
 #: No job of the table takes nearly as long [s].

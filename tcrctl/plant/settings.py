@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from tcrctl.settings import NotNegative, OrOff, Path, Positive, Settings, Vector, quantity
+from tcrctl.config.settings import NotNegative, OrOff, Path, Positive, Settings, Vector, quantity
 
 
 class Mismatch(Settings):

@@ -25,8 +25,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from tcrctl.analysis.history import History
 from tcrctl.errors import DeviceError, UnknownNameError
-from tcrctl.history import History
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from tcrctl.history import History
+from tcrctl.analysis.history import History
 from tcrctl.plots import style
 from tcrctl.plots.cables import draw_cables
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tcrctl.history import History
+from tcrctl.analysis.history import History
 from tcrctl.plots import style
 from tcrctl.signals import Array
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from tcrctl.history import History
+from tcrctl.analysis.history import History
 from tcrctl.plots import style
 
 

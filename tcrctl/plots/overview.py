@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tcrctl.history import History
+from tcrctl.analysis.history import History
+from tcrctl.analysis.skeleton import read_skeleton
 from tcrctl.plots import style
 from tcrctl.plots.space import draw_body, equal_scale
 from tcrctl.signals import Array
-from tcrctl.skeleton import read_skeleton
 
 _VIEWS: Final = {(0, 1): "from above", (0, 2): "from the front", (1, 2): "from the side"}
 

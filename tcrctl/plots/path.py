@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from tcrctl.history import History
+from tcrctl.analysis.history import History
 from tcrctl.plots import style
 from tcrctl.plots.space import arrows, equal_scale, name_axes
 from tcrctl.signals import Array

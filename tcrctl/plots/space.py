@@ -7,10 +7,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from tcrctl.analysis.skeleton import Skeleton
 from tcrctl.log.geometry import NODES_PER_MODULE
 from tcrctl.plots import style
 from tcrctl.signals import Array
-from tcrctl.skeleton import Skeleton
 
 #: How far apart the nodes of a ring are on the circle; only the ring's outline is drawn with it.
 _CIRCLE: Final = 2.0 * np.pi * np.arange(37) / 36

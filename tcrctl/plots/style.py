@@ -12,7 +12,7 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tcrctl.history import History
+from tcrctl.analysis.history import History
 from tcrctl.signals import Array
 
 BLACK: Final = "#000000"

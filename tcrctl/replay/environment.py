@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+from tcrctl.experiment.provenance import VERSIONS, versions
 from tcrctl.log.reader import Log
-from tcrctl.provenance import VERSIONS, versions
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from tcrctl import strict_yaml
+from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.experiment.provenance import ROBOT
+from tcrctl.experiment.run_folder import RESOLVED, SPEC
+from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, misfits
 from tcrctl.log.reader import Log
-from tcrctl.provenance import ROBOT
 from tcrctl.robot.description import RobotDescription
-from tcrctl.run_folder import RESOLVED, SPEC
-from tcrctl.spec import ExperimentSpec, LoadedSpec, misfits
 
 #: Sections that a replay can change: the others made what was recorded.
 CHANGEABLE: Final = ("controller", "estimator", "safety")

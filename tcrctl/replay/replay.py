@@ -17,12 +17,13 @@ import numpy as np
 from tcrctl.controller.controller import Controller, build_controller
 from tcrctl.errors import StoppedError
 from tcrctl.estimator.estimator import build_estimator
-from tcrctl.experiment import Experiment, make_trajectory
+from tcrctl.experiment.prepare import Experiment, make_trajectory
 from tcrctl.log.checksums import checksums
 from tcrctl.log.comparison import Comparison, quantities
 from tcrctl.log.reader import Log, read_log
-from tcrctl.loop import run_loop
-from tcrctl.pacing import Unpaced
+from tcrctl.loop.loop import run_loop
+from tcrctl.loop.pacing import Unpaced
+from tcrctl.loop.safety import SafetyLimits
 from tcrctl.plant.recorded import Limits, Recorded, RecordingEndedError
 from tcrctl.plant.stroke import within_stroke
 from tcrctl.replay.environment import Change, changes
@@ -30,7 +31,6 @@ from tcrctl.replay.rebuild import Origin, rebuild
 from tcrctl.replay.replayed_log import open_replayed
 from tcrctl.replay.result import ALL_STEPS, EXACT, Replay, Tolerance, Window
 from tcrctl.robot.robot import Robot, build_robot
-from tcrctl.safety import SafetyLimits
 from tcrctl.signals import StepRecord
 from tcrctl.trajectory.start_blend import StartBlend
 from tcrctl.trajectory.trajectory import Trajectory

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from tcrctl.experiment.provenance import VERSIONS, resolved_text, versions
+from tcrctl.experiment.run import log_geometry
+from tcrctl.experiment.run_folder import RESOLVED
 from tcrctl.log.reader import Log
 from tcrctl.log.writer import LogWriter
-from tcrctl.provenance import VERSIONS, resolved_text, versions
 from tcrctl.replay.rebuild import Origin
 from tcrctl.robot.robot import Robot
-from tcrctl.run import log_geometry
-from tcrctl.run_folder import RESOLVED
 
 
 def open_replayed(out: Path, log: Log, origin: Origin, robot: Robot) -> LogWriter:

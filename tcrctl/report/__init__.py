@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tcrctl.analysis.history import read_histories
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.history import read_histories
 from tcrctl.report.numbers import payload
 from tcrctl.report.page import page
 from tcrctl.report.summary import run_summary

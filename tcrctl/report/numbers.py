@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.history import History
+from tcrctl.analysis.history import History
+from tcrctl.analysis.skeleton import read_skeleton
 from tcrctl.signals import Array
-from tcrctl.skeleton import read_skeleton
 
 MOST_POINTS: Final = 4000
 """Points per curve; of more, the smallest and the largest of every bundle are kept."""

@@ -10,8 +10,8 @@ from string import Template
 from typing import Any, Final
 
 from tcrctl import __version__
-from tcrctl.history import History
-from tcrctl.summary import UNITS
+from tcrctl.analysis.history import History
+from tcrctl.experiment.summary import UNITS
 
 _SCRIPTS: Final = ("data.js", "robot.js", "charts.js", "page.js")
 _STATUS: Final = {"success": "good", "failed": "bad", "aborted": "bad", "error": "bad"}

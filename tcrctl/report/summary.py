@@ -6,8 +6,8 @@ import dataclasses
 import json
 from typing import Any
 
+from tcrctl.experiment.metrics import Metrics
 from tcrctl.log.reader import Log
-from tcrctl.metrics import Metrics
 
 
 def run_summary(log: Log) -> dict[str, Any]:

@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from tcrctl.config.settings import Path
 from tcrctl.robot.sections import CableSettings, FreeRoute, Route, SpringBetween, SpringSettings
-from tcrctl.settings import Path
 
 if TYPE_CHECKING:
     from tcrctl.robot.description import RobotDescription

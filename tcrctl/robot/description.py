@@ -12,7 +12,8 @@ from pathlib import Path
 
 from pydantic import Field, model_validator
 
-from tcrctl import shipped, strict_yaml
+from tcrctl.config import shipped, strict_yaml
+from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.robot.checks import disagreements
 from tcrctl.robot.sections import (
     CableSettings,
@@ -26,7 +27,6 @@ from tcrctl.robot.sections import (
     Tip,
     Vector,
 )
-from tcrctl.settings import Settings, quantity, refuse
 
 
 class RobotDescription(Settings):

@@ -6,7 +6,7 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import Discriminator, Field, Tag
 
-from tcrctl.settings import Settings, quantity
+from tcrctl.config.settings import Settings, quantity
 
 Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 NodeName: TypeAlias = Annotated[str, Field(pattern=r"^(base|m[1-9][0-9]*)\.(n1|n2|n3|apex)$")]

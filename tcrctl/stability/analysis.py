@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from tcrctl.controller.inner_map import InnerMap
 from tcrctl.errors import DivergenceError, InputError, StoppedError
-from tcrctl.experiment import Experiment, Parts, build_parts, build_plant
-from tcrctl.interruption import Interruption
-from tcrctl.loop import run_loop
+from tcrctl.experiment.prepare import Experiment, Parts, build_parts, build_plant
+from tcrctl.loop.interruption import Interruption
+from tcrctl.loop.loop import run_loop
+from tcrctl.loop.pacing import Unpaced
 from tcrctl.numerics.spectrum import derivative, largest_eigenvalues
-from tcrctl.pacing import Unpaced
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.signals import Array, StepRecord
 from tcrctl.stability.closed_loop import ClosedLoop, StepMap
@@ -65,7 +65,7 @@ def analyse(
     """Run an experiment in simulation, without noise, and linearise its loop on the way.
 
     Args:
-        experiment: What :func:`tcrctl.experiment.prepare` made.
+        experiment: What :func:`tcrctl.experiment.prepare.prepare` made.
         points: How many points, spread evenly over the run.
         every: Take every n-th control step instead.
         progress: Takes the number of steps done and their total, after every step.

@@ -15,7 +15,7 @@ import numpy as np
 
 from tcrctl.controller.controller import Controller
 from tcrctl.estimator.estimator import Estimator
-from tcrctl.loop import still
+from tcrctl.loop.loop import still
 from tcrctl.memory import Kept, Remembers
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.signals import Array, Command, ControlInfo, Reference
@@ -38,7 +38,7 @@ class ClosedLoop:
     applied: Command | None = None
 
     def step(self, reference: Reference) -> ControlInfo:
-        """One control step, as in :func:`tcrctl.loop.run_loop`.
+        """One control step, as in :func:`tcrctl.loop.loop.run_loop`.
 
         Raises:
             DivergenceError: If the plant's integrator did not converge.

@@ -1,1 +1,1 @@
-"""Tasks: what a run is for, beyond following its trajectory; one file per kind, settings in ``settings.py``."""
+"""Tasks: what a run is for, beyond following its trajectory, with the geometry that it takes; one kind one file."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tcrctl.numerics.perforated_plate import Plates
 from tcrctl.signals import Array
+from tcrctl.task.perforated_plate import Plates
 from tcrctl.task.pipe import Seen, exactly
 from tcrctl.task.settings import WALLS, BoxHoleSettings, BoxSettings
 from tcrctl.trajectory.pose_path import MM, EndPose, unit

@@ -8,12 +8,12 @@ from typing import Any, Final
 import numpy as np
 
 from tcrctl.log.event import Event
-from tcrctl.numerics.perforated_plate import blocks, nearest
-from tcrctl.numerics.sight import hides, in_view
 from tcrctl.signals import Array, StepRecord
 from tcrctl.task.body import segment_name, segments
 from tcrctl.task.box import Box
+from tcrctl.task.perforated_plate import blocks, nearest
 from tcrctl.task.settings import WALLS, BoxInspectionSettings
+from tcrctl.task.sight import hides, in_view
 from tcrctl.trajectory.pose_path import MM
 
 #: Parts of the robot farther from the walls than this are of no interest [m].

@@ -10,9 +10,9 @@ from typing import Any, Final
 import numpy as np
 
 from tcrctl.log.event import Event
-from tcrctl.numerics import bore
 from tcrctl.numerics.rotation import angle_between, angles_from_normal
 from tcrctl.signals import Array, Reference, StepRecord
+from tcrctl.task import bore
 from tcrctl.task.pipe import Pipe
 from tcrctl.trajectory.pose_path import MM, EndPose
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tcrctl.numerics.bore import Bore
 from tcrctl.signals import Array
+from tcrctl.task.bore import Bore
 from tcrctl.task.settings import PipeSettings
 from tcrctl.trajectory.pose_path import MM, EndPose
 

@@ -10,7 +10,7 @@ from typing import Annotated, Final, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, model_validator
 
-from tcrctl.settings import Path, Settings, quantity, refuse
+from tcrctl.config.settings import Path, Settings, quantity, refuse
 from tcrctl.trajectory.values import NotNegative, Positive, Vector, not_empty
 
 #: How far markers may lie off the symmetry that the pose is computed from [mm].

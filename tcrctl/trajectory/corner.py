@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
-from .plane_curve import PlanePiece, turn_angle
+from tcrctl.trajectory.plane_curve import PlanePiece, turn_angle
 
 TANGENT_TOLERANCE = math.radians(1e-3)  # joins of typed numbers are never exactly tangent
 BISECTIONS = 60  # halves the search interval to below rounding

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from ..settings import Settings, quantity
-from .values import NotNegative, Positive, not_empty
+from tcrctl.config.settings import Settings, quantity
+from tcrctl.trajectory.values import NotNegative, Positive, not_empty
 
 
 class DriveLegSettings(Settings):

@@ -10,12 +10,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..robot import pose
-from ..robot.equilibrium import equilibrium
-from ..robot.robot import Robot
-from ..signals import Array
-from .drive_settings import DriveLegSettings, DrivesSettings
-from .time_law import Phase, TimeLaw
+from tcrctl.robot import pose
+from tcrctl.robot.equilibrium import equilibrium
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+from tcrctl.trajectory.drive_settings import DriveLegSettings, DrivesSettings
+from tcrctl.trajectory.time_law import Phase, TimeLaw
 
 MM = 1e-3  # [m]
 SPACING = 2.5 * MM  # of the drive lengths at which the end pose is computed; linear in between [m]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..robot.robot import Robot
-from ..signals import Array
-from .settings import HoldSettings
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+from tcrctl.trajectory.settings import HoldSettings
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from .settings import ArcSettings, StrokeSettings
+from tcrctl.trajectory.settings import ArcSettings, StrokeSettings
 
 MM = 1e-3  # [m]
 

@@ -15,9 +15,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..numerics import rotation
-from ..signals import Array
-from .time_law import Phase, TimeLaw
+from tcrctl.numerics import rotation
+from tcrctl.signals import Array
+from tcrctl.trajectory.time_law import Phase, TimeLaw
 
 MM = 1e-3  # [m]
 

@@ -6,8 +6,8 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from ..settings import Settings, quantity
-from .values import Direction, NotNegative, Positive, Vector, check_one_of, not_empty
+from tcrctl.config.settings import Settings, quantity
+from tcrctl.trajectory.values import Direction, NotNegative, Positive, Vector, check_one_of, not_empty
 
 Span: TypeAlias = tuple[float, float]
 """Value at the start and at the end."""

@@ -6,10 +6,20 @@ import math
 
 import numpy as np
 
-from ..robot.robot import Robot
-from ..signals import Array
-from .pose_path import MM, EndPose, PosePath, Revolution, StraightMove, blend, radians, rest, turn
-from .pose_settings import RevolutionSettings
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+from tcrctl.trajectory.pose_path import (
+    MM,
+    EndPose,
+    PosePath,
+    Revolution,
+    StraightMove,
+    blend,
+    radians,
+    rest,
+    turn,
+)
+from tcrctl.trajectory.pose_settings import RevolutionSettings
 
 
 def build_revolution(settings: RevolutionSettings, robot: Robot) -> PosePath:

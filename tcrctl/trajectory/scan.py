@@ -6,12 +6,22 @@ import math
 
 import numpy as np
 
-from ..numerics import rotation
-from ..robot.robot import Robot
-from ..signals import Array
-from .pose_path import MM, EndPose, PosePath, Revolution, StraightMove, blend, rest, turn, unit
-from .pose_settings import ScanSettings
-from .waypoints import place_of
+from tcrctl.numerics import rotation
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+from tcrctl.trajectory.pose_path import (
+    MM,
+    EndPose,
+    PosePath,
+    Revolution,
+    StraightMove,
+    blend,
+    rest,
+    turn,
+    unit,
+)
+from tcrctl.trajectory.pose_settings import ScanSettings
+from tcrctl.trajectory.waypoints import place_of
 
 UP = np.array([0.0, 0.0, 1.0])
 STEEP = 1e-6  # sine of the angle to the vertical below which "straight up" says nothing

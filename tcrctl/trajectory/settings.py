@@ -8,10 +8,10 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from ..settings import Path, Settings, quantity
-from .drive_settings import DrivesSettings
-from .pose_settings import PlaceSettings, RevolutionSettings, ScanSettings, WaypointsSettings
-from .values import NotNegative, Positive, Vector, check_one_of, not_empty
+from tcrctl.config.settings import Path, Settings, quantity
+from tcrctl.trajectory.drive_settings import DrivesSettings
+from tcrctl.trajectory.pose_settings import PlaceSettings, RevolutionSettings, ScanSettings, WaypointsSettings
+from tcrctl.trajectory.values import NotNegative, Positive, Vector, check_one_of, not_empty
 
 JOIN_TOLERANCE_MM = 1e-6
 AXIS_TOLERANCE = 1e-3  # axes typed with four decimals pass; the builder makes them exactly orthonormal

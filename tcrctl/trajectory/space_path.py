@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..signals import Array
-from .plane_curve import PlanePiece
-from .settings import PlaneSettings
+from tcrctl.signals import Array
+from tcrctl.trajectory.plane_curve import PlanePiece
+from tcrctl.trajectory.settings import PlaneSettings
 
 
 @dataclass(frozen=True, slots=True)

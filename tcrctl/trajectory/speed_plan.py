@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .time_law import Phase, ramp, ramp_slope
+from tcrctl.trajectory.time_law import Phase, ramp, ramp_slope
 
 BISECTIONS = 60  # halves the search interval to below rounding
 SAFETY = 1.001  # covers what the peak of a ramp's acceleration may exceed its largest value on the grid

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..robot.robot import Robot
-from ..signals import Array
-from .corner import rounded, split_at_corners
-from .plane_curve import MM, PlanePiece, stroke_pieces
-from .settings import JOIN_TOLERANCE_MM, StrokeSettings, StrokesSettings
-from .space_path import Plane, SpacePath, SpacePiece, lifted, straight
-from .speed_plan import MotionLimits, rest_to_rest, zones
-from .time_law import Phase, TimeLaw
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+from tcrctl.trajectory.corner import rounded, split_at_corners
+from tcrctl.trajectory.plane_curve import MM, PlanePiece, stroke_pieces
+from tcrctl.trajectory.settings import JOIN_TOLERANCE_MM, StrokeSettings, StrokesSettings
+from tcrctl.trajectory.space_path import Plane, SpacePath, SpacePiece, lifted, straight
+from tcrctl.trajectory.speed_plan import MotionLimits, rest_to_rest, zones
+from tcrctl.trajectory.time_law import Phase, TimeLaw
 
 
 @dataclass(frozen=True, slots=True)

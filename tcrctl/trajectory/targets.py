@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
-from .pose_path import MM, EndPose
-from .pose_settings import ScanSettings, WaypointSettings, WaypointsSettings
-from .settings import TrajectorySettings
-from .values import Vector
+from tcrctl.trajectory.pose_path import MM, EndPose
+from tcrctl.trajectory.pose_settings import ScanSettings, WaypointSettings, WaypointsSettings
+from tcrctl.trajectory.settings import TrajectorySettings
+from tcrctl.trajectory.values import Vector
 
 Targets: TypeAlias = Mapping[str, EndPose]
 

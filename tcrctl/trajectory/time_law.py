@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..signals import Array
+from tcrctl.signals import Array
 
 
 def ramp(x: Array) -> Array:

@@ -7,16 +7,16 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from ..robot.robot import Robot
-from ..signals import Array, Reference
-from .drives import build_drives
-from .hold import build_hold
-from .revolution import build_revolution
-from .scan import build_scan
-from .settings import TrajectorySettings
-from .strokes import build_strokes
-from .targets import Targets, with_targets
-from .waypoints import build_waypoints
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array, Reference
+from tcrctl.trajectory.drives import build_drives
+from tcrctl.trajectory.hold import build_hold
+from tcrctl.trajectory.revolution import build_revolution
+from tcrctl.trajectory.scan import build_scan
+from tcrctl.trajectory.settings import TrajectorySettings
+from tcrctl.trajectory.strokes import build_strokes
+from tcrctl.trajectory.targets import Targets, with_targets
+from tcrctl.trajectory.waypoints import build_waypoints
 
 
 class Trajectory(Protocol):

@@ -8,9 +8,9 @@ from typing import Annotated, TypeAlias, TypeVar
 
 from pydantic import AfterValidator
 
-from ..settings import NotNegative as NotNegative
-from ..settings import Positive as Positive
-from ..settings import Vector as Vector
+from tcrctl.config.settings import NotNegative as NotNegative
+from tcrctl.config.settings import Positive as Positive
+from tcrctl.config.settings import Vector as Vector
 
 _Item = TypeVar("_Item")
 

@@ -8,12 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..numerics import rotation
-from ..robot.robot import Robot
-from ..signals import Array
-from .pose_path import MM, EndPose, PoseMove, PosePath, StraightMove, rest, unit
-from .pose_settings import PlaceSettings, WaypointSettings, WaypointsSettings
-from .speed_plan import MotionLimits, Zone, rest_to_rest
+from tcrctl.numerics import rotation
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+from tcrctl.trajectory.pose_path import MM, EndPose, PoseMove, PosePath, StraightMove, rest, unit
+from tcrctl.trajectory.pose_settings import PlaceSettings, WaypointSettings, WaypointsSettings
+from tcrctl.trajectory.speed_plan import MotionLimits, Zone, rest_to_rest
 
 QUICK = 1e6  # limit of a leg that goes nowhere; it takes two ramps
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from tcrctl.cli.rig.rows import cable_names, flat, print_rows
 
 if TYPE_CHECKING:
-    from tcrctl.plant.rig_file import LoadedRig
-    from tcrctl.plant.session import Session
+    from tcrctl.plant.rig.file import LoadedRig
+    from tcrctl.plant.rig.session import Session
 
 
 def act(
@@ -35,8 +35,8 @@ def act(
         action: Does it; takes the rig, the names of the cables and the session.
     """
     from tcrctl.cli.consent import ask
-    from tcrctl.plant.session import Session
-    from tcrctl.rig.choice import choose
+    from tcrctl.commissioning.choice import choose
+    from tcrctl.plant.rig.session import Session
 
     loaded, description = choose(rig, robot)
     if not (dry_run or yes):

@@ -33,12 +33,12 @@ def calibrate(
       tcrctl rig calibrate my_bench.yaml --seconds 20
       tcrctl rig calibrate loopback --robot tcr600 -o my_bench.yaml
     """
+    from tcrctl.commissioning.calibrate import calibrate_rig, calibration_text, write_calibrated
+    from tcrctl.commissioning.choice import choose
+    from tcrctl.config.shipped import is_path
     from tcrctl.errors import InputError
-    from tcrctl.interruption import signals_exit
-    from tcrctl.rig.calibrate import calibrate_rig, calibration_text, write_calibrated
-    from tcrctl.rig.choice import choose
+    from tcrctl.loop.interruption import signals_exit
     from tcrctl.robot.robot import build_robot
-    from tcrctl.shipped import is_path
 
     if not (is_path(rig) or out or dry_run):
         raise InputError(f"{rig} is shipped and not changed; give -o FILE or --dry-run")

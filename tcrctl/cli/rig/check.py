@@ -30,9 +30,9 @@ def check(
       tcrctl rig check loopback
       tcrctl rig check my_bench.yaml --robot tcr700 --period-s 0.01 --json
     """
-    from tcrctl.interruption import signals_exit
-    from tcrctl.rig.choice import choose_all
-    from tcrctl.rig.finding import Finding, worst
+    from tcrctl.commissioning.choice import choose_all
+    from tcrctl.commissioning.finding import Finding, worst
+    from tcrctl.loop.interruption import signals_exit
 
     lines: list[tuple[str, Finding]] = []
     with signals_exit():
@@ -40,7 +40,7 @@ def check(
             lines.append((loaded.robot, Finding("rig file", f"{loaded.path} is valid")))
             if dry_run:
                 continue
-            from tcrctl.rig.check import check_rig
+            from tcrctl.commissioning.check import check_rig
             from tcrctl.robot.robot import build_robot
 
             lines += [

@@ -11,8 +11,8 @@ from tcrctl.cli.rig.action import act
 from tcrctl.cli.rig.options import DryRun, Rig, Robot, Yes
 
 if TYPE_CHECKING:
-    from tcrctl.plant.rig_file import LoadedRig
-    from tcrctl.plant.session import Session
+    from tcrctl.plant.rig.file import LoadedRig
+    from tcrctl.plant.rig.session import Session
 
 
 def jog(
@@ -35,9 +35,9 @@ def jog(
       tcrctl rig jog my_bench.yaml --cable all --to-mm 0 --speed-mm-s 3
       tcrctl rig jog my_bench.yaml --cable c1 --cable c3 --by-mm -1 --dry-run
     """
+    from tcrctl.commissioning.jog import Jog, jog_rig
     from tcrctl.errors import InputError
-    from tcrctl.interruption import Interruption
-    from tcrctl.rig.jog import Jog, jog_rig
+    from tcrctl.loop.interruption import Interruption
 
     if (by_mm is None) == (to_mm is None):
         raise InputError("give either --by-mm or --to-mm")

@@ -16,7 +16,7 @@ def reset(
       tcrctl rig reset loopback --robot tcr600 --dry-run
       tcrctl rig reset my_bench.yaml --yes
     """
-    from tcrctl.rig.zero import reset_rig
+    from tcrctl.commissioning.zero import reset_rig
 
     act(
         rig, robot, dry_run, yes, as_json,

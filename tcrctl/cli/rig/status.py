@@ -19,9 +19,9 @@ def status(rig: Rig, robot: Robot = None, as_json: AsJson = False) -> None:
       tcrctl rig status loopback
       tcrctl rig status my_bench.yaml --json | jq .robots[0].drives.position_mm
     """
-    from tcrctl.interruption import signals_exit
-    from tcrctl.rig.choice import choose_all
-    from tcrctl.rig.status import rig_status
+    from tcrctl.commissioning.choice import choose_all
+    from tcrctl.commissioning.status import rig_status
+    from tcrctl.loop.interruption import signals_exit
 
     with signals_exit():
         found = [

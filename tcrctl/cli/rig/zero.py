@@ -18,7 +18,7 @@ def zero(
       tcrctl rig zero loopback --robot tcr600 --dry-run
       tcrctl rig zero my_bench.yaml
     """
-    from tcrctl.rig.zero import zero_rig
+    from tcrctl.commissioning.zero import zero_rig
 
     act(
         rig, robot, dry_run, yes, as_json,

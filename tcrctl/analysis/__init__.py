@@ -1,0 +1,1 @@
+"""What a log tells afterwards: histories, a drawing's lines, contents, differences, tables."""

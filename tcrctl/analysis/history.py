@@ -1,0 +1,270 @@
+"""A run as time histories, read from its log: what figures and reports show.
+
+log.mcap -> read_histories -> History: wanted and actual end pose, drives, tensions, timing, shapes, limits
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcrctl.config import strict_yaml
+from tcrctl.errors import InputError, TcrctlError
+from tcrctl.experiment.provenance import ROBOT
+from tcrctl.experiment.run_folder import RESOLVED, log_in
+from tcrctl.log.geometry import NODES_PER_MODULE
+from tcrctl.log.reader import Log, read_log
+from tcrctl.signals import Array
+
+_COLUMNS: Final = (
+    "t", "period", "reference_position", "reference_normal", "measurement_drive", "applied_speed",
+    "info_saturated", "timing_estimate", "timing_control", "timing_lateness",
+)  # fmt: skip
+#: What a simulated plant knows exactly and an estimator finds; the truth is shown where there is one.
+_STATE: Final = ("position", "normal", "tension", "q")
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What the run had to keep; None where its files do not say.
+
+    Attributes:
+        speed: Largest drive speed [m/s].
+        stroke: Smallest and largest drive length [m].
+        tension: Largest tension allowed [N].
+        floor: Smallest tension that the controller wants [N].
+        ceiling: Largest tension that the controller wants [N].
+    """
+
+    speed: float | None = None
+    stroke: tuple[float, float] | None = None
+    tension: float | None = None
+    floor: float | None = None
+    ceiling: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """One run over time; n steps, m cables. What a step lacks is NaN.
+
+    Attributes:
+        label: Name of the run in legends.
+        log: The log it was read from.
+        simulated: True if the state is that of the simulated plant, False if it is the estimate.
+        t: Time of every step (n,) [s].
+        period: Control period of every step (n,) [s].
+        position: End position (n, 3) [m].
+        normal: End normal (n, 3).
+        wanted_position: Its reference (n, 3) [m].
+        wanted_normal: Its reference (n, 3); NaN where the orientation is free.
+        drive: Drive lengths measured (n, m) [m].
+        speed: Drive speeds applied (n, m) [m/s].
+        saturated: Which of them stood at a limit (n, m).
+        tension: Cable tensions (n, m) [N].
+        compute: Time that estimator and controller took (n,) [s].
+        lateness: How late the step began (n,) [s]; 0 if nothing paced the run.
+        shape_step: Steps whose shape is known (f,).
+        shape: Node positions at these steps (f, n_nodes, 3) [m].
+        limits: What had to be kept.
+    """
+
+    label: str
+    log: Log
+    simulated: bool
+    t: Array
+    period: Array
+    position: Array
+    normal: Array
+    wanted_position: Array
+    wanted_normal: Array
+    drive: Array
+    speed: Array
+    saturated: NDArray[np.bool_]
+    tension: Array
+    compute: Array
+    lateness: Array
+    shape_step: NDArray[np.int64]
+    shape: Array
+    limits: Limits
+
+    @property
+    def cables(self) -> tuple[str, ...]:
+        """Name of every cable; numbers if the log knows none."""
+        count = self.drive.shape[1]
+        names = self.log.cable_names
+        return names if len(names) == count else tuple(str(c + 1) for c in range(count))
+
+    @property
+    def position_error(self) -> Array:
+        """Distance of the end from where it was wanted (n,) [m]."""
+        distance: Array = np.linalg.norm(self.position - self.wanted_position, axis=1)
+        return distance
+
+    @property
+    def tracks_orientation(self) -> bool:
+        """Whether an end normal was wanted at any step."""
+        return bool(np.isfinite(self.wanted_normal).all(axis=1).any())
+
+    @property
+    def orientation_error(self) -> Array:
+        """Angle between the end normal and the one wanted (n,) [rad]."""
+        apart, sum_ = self.normal - self.wanted_normal, self.normal + self.wanted_normal
+        angle: Array = 2.0 * np.arctan2(np.linalg.norm(apart, axis=1), np.linalg.norm(sum_, axis=1))
+        return angle
+
+    @property
+    def angles(self) -> Array:
+        """theta_x and theta_y of the end, (45), without jumps (n, 2) [rad]."""
+        return orientation_angles(self.normal)
+
+    @property
+    def wanted_angles(self) -> Array:
+        """theta_x and theta_y of the reference (n, 2) [rad]."""
+        return orientation_angles(self.wanted_normal)
+
+
+def orientation_angles(normal: Array) -> Array:
+    """Solve (45) for every normal.
+
+    Args:
+        normal: Unit normals over time (n, 3); rows of NaN stay NaN.
+
+    Returns:
+        theta_x and theta_y (n, 2) [rad]; theta_x is made continuous, so that it may leave ±pi.
+    """
+    x, y, z = normal.T
+    angles = np.stack([np.arctan2(-y, z), np.arctan2(x, np.hypot(y, z))], axis=1)
+    known = np.isfinite(angles[:, 0])
+    angles[known, 0] = np.unwrap(angles[known, 0])
+    return angles
+
+
+def read_histories(
+    paths: Sequence[Path],
+    *,
+    labels: Sequence[str] = (),
+    begin: float | None = None,
+    end: float | None = None,
+) -> list[History]:
+    """Read runs, finished or not.
+
+    Args:
+        paths: Logs, or folders of runs.
+        labels: Their names in legends, one each; found from the logs if left out.
+        begin: First time shown [s].
+        end: Last time shown [s].
+
+    Raises:
+        InputError: If a file is not a log, no step lies in the span, or the labels do not match the logs.
+        LogError: If a log is damaged inside.
+    """
+    if labels and len(labels) != len(paths):
+        raise InputError(f"{len(labels)} labels for {len(paths)} logs; give one per log, or none")
+    logs = [read_log(log_in(path)) for path in paths]
+    names = labels or _labels(logs)
+    return [_history(log, name, begin, end) for log, name in zip(logs, names, strict=True)]
+
+
+def _labels(logs: Sequence[Log]) -> list[str]:
+    """Shortest names that tell the runs apart: experiment, or with what was set, or with the run's id."""
+    spec = [log.start.get("spec") or log.path.stem for log in logs]
+    overrides = [" ".join(_overrides(log)) for log in logs]
+    found = []
+    for i, log in enumerate(logs):
+        long = f"{spec[i]} {overrides[i]}".strip()
+        alike = Counter(f"{a} {b}".strip() for a, b in zip(spec, overrides, strict=True))
+        if spec.count(spec[i]) == 1:
+            found.append(spec[i])
+        elif alike[long] == 1:
+            found.append(long)
+        else:
+            found.append(f"{long} ({log.start.get('run_id', str(i + 1))[-4:]})")
+    return found
+
+
+def _overrides(log: Log) -> list[str]:
+    try:
+        given = json.loads(log.start.get("overrides", "[]"))
+    except ValueError:
+        return []
+    return [str(item) for item in given] if isinstance(given, list) else []
+
+
+def _history(log: Log, label: str, begin: float | None, end: float | None) -> History:
+    state = [f"{part}_{name}" for part in ("truth", "estimate") for name in _STATE]
+    columns = log.columns([*_COLUMNS, *state])
+    t = columns["t"]
+    shown = (t >= (-np.inf if begin is None else begin)) & (t <= (np.inf if end is None else end))
+    if not shown.any():
+        span = f"; it has steps from {t[0]:g} to {t[-1]:g} s" if len(t) else ""
+        raise InputError(f"{log.path}: has no steps to show{span}")
+    columns = {name: values[shown] for name, values in columns.items()}
+    part = "truth" if "truth_position" in columns else "estimate"
+    shape_step, shape = _shapes(columns[f"{part}_q"])
+    return History(
+        label=label,
+        log=log,
+        simulated=part == "truth",
+        t=columns["t"],
+        period=columns["period"],
+        position=columns[f"{part}_position"],
+        normal=columns[f"{part}_normal"],
+        wanted_position=columns["reference_position"],
+        wanted_normal=columns["reference_normal"],
+        drive=columns["measurement_drive"],
+        speed=columns["applied_speed"],
+        saturated=columns["info_saturated"],
+        tension=columns[f"{part}_tension"],
+        compute=columns["timing_estimate"] + columns["timing_control"],
+        lateness=columns["timing_lateness"],
+        shape_step=shape_step,
+        shape=shape,
+        limits=_limits(log),
+    )
+
+
+def _shapes(q: NDArray[Any]) -> tuple[NDArray[np.int64], Array]:
+    """Steps with a whole shape, and the shapes; a log need not have one at every step."""
+    if not q.shape[1] or q.shape[1] % (3 * NODES_PER_MODULE):
+        return np.zeros(0, np.int64), np.zeros((0, 0, 3))
+    known = np.flatnonzero(np.isfinite(q).all(axis=1))
+    return known, q[known].reshape(len(known), -1, 3).astype(np.float64)
+
+
+def _limits(log: Log) -> Limits:
+    """Read the limits in the attached files; a file of another version may lack any of them."""
+    spec, robot = attached(log, RESOLVED), attached(log, ROBOT)
+    stroke = [_number(robot, "stroke_mm", end, scale=1e-3) for end in (0, 1)]
+    low, high = stroke
+    return Limits(
+        speed=_number(spec, "controller", "speed_limit_mm_s", scale=1e-3),
+        stroke=None if low is None or high is None else (low, high),
+        tension=_number(robot, "tension_limit_n"),
+        floor=_number(spec, "controller", "tension", "floor_n"),
+        ceiling=_number(spec, "controller", "tension", "ceiling_n"),
+    )
+
+
+def attached(log: Log, name: str) -> Any:
+    """Content of an attached YAML file; None if it is not there or cannot be read."""
+    _, text = log.attachments.get(name, ("", b""))
+    try:
+        return strict_yaml.loads(text, name).data
+    except TcrctlError:
+        return None
+
+
+def _number(data: Any, *path: str | int, scale: float = 1.0) -> float | None:
+    for key in path:
+        try:
+            data = data[key]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return scale * data if isinstance(data, int | float) else None

@@ -1,0 +1,69 @@
+"""What is drawn of a robot besides its nodes: springs and cables, from the robot file that a log carries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcrctl.config import strict_yaml
+from tcrctl.elements.torus import point_weights
+from tcrctl.errors import TcrctlError
+from tcrctl.experiment.provenance import ROBOT
+from tcrctl.log.geometry import NODES_PER_MODULE, CableRoute
+from tcrctl.log.reader import Log
+from tcrctl.robot.description import RobotDescription, cable_routes, spring_list
+from tcrctl.robot.model import node_index
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """Which nodes are joined; node rows as in the notation table (:mod:`tcrctl`).
+
+    Attributes:
+        springs: End nodes of every spring (n_springs, 2).
+        natural_length: Their natural lengths (n_springs,) [m].
+        cables: One route per cable, in the order of the drives.
+        tip_ring: Module whose ring is the end.
+    """
+
+    springs: NDArray[np.int64]
+    natural_length: NDArray[np.float64]
+    cables: tuple[CableRoute, ...]
+    tip_ring: int
+
+
+def read_skeleton(log: Log, n_nodes: int) -> Skeleton | None:
+    """Find what joins the nodes of a logged robot.
+
+    Args:
+        log: The log.
+        n_nodes: Nodes of its shapes.
+
+    Returns:
+        None if the log carries no robot file, or one that this version does not understand or that is not that
+        of its shapes: a picture without springs and cables is better than none.
+    """
+    _, text = log.attachments.get(ROBOT, ("", b""))
+    try:
+        robot = strict_yaml.validate(strict_yaml.loads(text, ROBOT), RobotDescription)
+    except TcrctlError:
+        return None
+    if NODES_PER_MODULE * (robot.modules.count + 1) != n_nodes:
+        return None
+    springs = spring_list(robot)
+    ends = [[node_index(name) for name in spring.nodes] for spring in springs]
+    return Skeleton(
+        springs=np.array(ends, dtype=np.int64).reshape(-1, 2),
+        natural_length=np.array([spring.natural_length for spring in springs]),
+        cables=tuple(
+            CableRoute(
+                name=route.name,
+                nodes=np.array([[NODES_PER_MODULE * ring + k for k in range(3)] for ring, _ in route.holes]),
+                weights=np.array([point_weights(angle) for _, angle in route.holes]),
+            )
+            for route in cable_routes(robot)
+        ),
+        tip_ring=robot.tip.ring,
+    )

@@ -1,0 +1,1 @@
+"""Work on the real bench beside experiments: check, status, calibrate, zero, jog, reset; one verb one file."""

@@ -1,0 +1,127 @@
+"""``tcrctl rig jog``: move single cables slowly, through the same limits and supervisor as a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tcrctl.commissioning.without_cameras import WithoutCameras
+from tcrctl.errors import InputError
+from tcrctl.loop.loop import step_count
+from tcrctl.loop.pacing import RealTime
+from tcrctl.plant.rig.bench import connect_drives, envelope, supervisor_rules
+from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.plant import RigLimits, RigPlant
+from tcrctl.plant.rig.session import Session
+from tcrctl.signals import Array, Command
+
+#: Period of the writes [s].
+PERIOD = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Jog:
+    """A motion asked for.
+
+    Attributes:
+        cables: Names of the cables.
+        by: How far [m]; None if the place is given.
+        to: Where to [m]; None if the distance is given.
+        speed: Largest speed [m/s].
+    """
+
+    cables: tuple[str, ...]
+    by: float | None
+    to: float | None
+    speed: float
+
+    def distances(self, names: tuple[str, ...], now: Array) -> Array:
+        """How far every cable has to move (m,) [m] from where it is ``now`` (m,) [m]."""
+        moving = np.array([name in self.cables for name in names])
+        wanted = np.full(len(names), self.by) if self.to is None else self.to - now
+        return np.where(moving, wanted, 0.0)
+
+
+def jog_rig(
+    loaded: LoadedRig,
+    names: tuple[str, ...],
+    jog: Jog,
+    session: Session,
+    *,
+    dry_run: bool,
+    check: Callable[[], None],
+) -> dict[str, Any]:
+    """Move cables and return where they were and are.
+
+    Args:
+        loaded: The rig file.
+        names: Cables of the robot in the order of the drives.
+        jog: The motion.
+        session: Takes events, knows whether the operator has agreed.
+        dry_run: Read where the drives are and return what would be done; nothing is written.
+        check: Raises if a signal asks to stop.
+
+    Raises:
+        InputError: If the motion leaves the limits.
+        StoppedError: If the drives are not ready, or the supervisor stops them.
+        DeviceError: If they do not answer.
+    """
+    rules = loaded.rig.safety
+    drives = connect_drives(loaded, names)
+    limits = RigLimits(
+        envelope(loaded.mounted, rules, names), supervisor_rules(rules), 1.0, 0, 0, rules.arm_timeout_s
+    )
+    pace = RealTime(PERIOD, check)
+    plant = RigPlant(WithoutCameras(), drives, limits, PERIOD, session)
+    try:
+        drives.check(rules, PERIOD)
+        plant.look()
+        start = 1e-6 * plant.position().astype(float)
+        distance = jog.distances(names, start)
+        duration = _check(jog, limits, names, start + distance, distance)
+        result = {
+            "from_mm": _by_name(names, start),
+            "to_mm": _by_name(names, start + distance),
+            "duration_s": duration,
+        }
+        if dry_run or not distance.any():
+            return result
+        plant.start()
+        for k in range(step_count(duration, PERIOD) + 1):
+            pace.wait(k * PERIOD)
+            plant.read()
+            plant.write(Command(distance * _rate(k, duration), start))
+    finally:
+        plant.close()
+    return {**result, "to_mm": _by_name(names, 1e-6 * plant.position().astype(float))}
+
+
+def _rate(k: int, duration: float) -> float:
+    """Share of the distance per second in step k: (1 - cos) / T, exact in sum over a whole number of steps."""
+    steps = step_count(duration, PERIOD)
+    if k >= steps:
+        return 0.0
+    return (1.0 - math.cos(2.0 * math.pi * (k + 0.5) / steps)) / (steps * PERIOD)
+
+
+def _check(jog: Jog, limits: RigLimits, names: tuple[str, ...], target: Array, distance: Array) -> float:
+    """Duration [s] of a motion whose highest speed, twice the mean, is the one asked for."""
+    unknown = [name for name in jog.cables if name not in names]
+    if unknown:
+        raise InputError(f"there is no cable {unknown[0]}; there are {', '.join(names)}")
+    low, high = 1e-6 * limits.envelope.low, 1e-6 * limits.envelope.high
+    for c, name in enumerate(names):
+        if distance[c] and not low[c] - 1e-9 <= target[c] <= high[c] + 1e-9:
+            raise InputError(
+                f"cable {name} would go to {1e3 * target[c]:.3f} mm, outside its limits "
+                f"{1e3 * low[c]:g} to {1e3 * high[c]:g} mm"
+            )
+    return max(2.0 * float(np.abs(distance).max()) / jog.speed, PERIOD)
+
+
+def _by_name(names: tuple[str, ...], values: Array) -> dict[str, float]:
+    return {name: round(1e3 * float(value), 3) for name, value in zip(names, values, strict=True)}

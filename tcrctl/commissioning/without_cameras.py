@@ -1,0 +1,25 @@
+"""For work on the drives alone: cameras that are always content."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from tcrctl.plant.rig.devices import Sighting
+from tcrctl.signals import RawFrame
+
+
+class WithoutCameras:
+    """Nothing is seen, and nothing has to be: the operator looks."""
+
+    rate = 1000.0
+
+    def next(self, timeout: float, *, fresh: bool) -> Sighting | None:
+        """A frame without markers, taken now."""
+        del timeout, fresh
+        none = RawFrame(0, 0, 0.0, np.zeros(0, np.int32), np.zeros((0, 3), np.float32), np.zeros(0, np.int32))
+        return Sighting(time.monotonic(), np.zeros((0, 3), np.float32), np.zeros(0, np.bool_), "", none)
+
+    def close(self) -> None:
+        """Nothing to close."""

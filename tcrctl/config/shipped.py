@@ -1,0 +1,136 @@
+"""Experiments, identifications, robots and rigs that come with the program, by name.
+
+Robots lie in the package. Experiments and rigs lie in ``experiments/`` and ``hardware/rigs/`` beside it in a
+checkout, and inside it in an installed wheel. The names of identifications, which lie with the experiments,
+begin with ``identify_``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from tcrctl.errors import InputError, UnknownNameError
+
+_PACKAGE = Path(__file__).parents[1]
+_IDENTIFY = "identify_"
+
+
+def experiments() -> dict[str, Path]:
+    """Return the files of the shipped experiments by name, sorted."""
+    return {name: path for name, path in _experiment_files().items() if not name.startswith(_IDENTIFY)}
+
+
+def identifications() -> dict[str, Path]:
+    """Return the files of the shipped identifications by name, sorted."""
+    return {name: path for name, path in _experiment_files().items() if name.startswith(_IDENTIFY)}
+
+
+def _experiment_files() -> dict[str, Path]:
+    inside = _PACKAGE / "experiments"
+    return _by_name(inside if inside.is_dir() else _PACKAGE.parent / "experiments")
+
+
+def robots() -> dict[str, Path]:
+    """Return the files of the shipped robots by name, sorted."""
+    return _by_name(_PACKAGE / "robot" / "models")
+
+
+def rigs() -> dict[str, Path]:
+    """Return the files of the shipped rigs by name, sorted."""
+    inside = _PACKAGE / "rigs"
+    return _by_name(inside if inside.is_dir() else _PACKAGE.parent / "hardware" / "rigs")
+
+
+def find_experiment(name_or_path: str) -> Path:
+    """Return the file of an experiment.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+
+    Raises:
+        UnknownNameError: If there is no shipped experiment of that name.
+        InputError: If the path leads to no file.
+    """
+    if is_identification(name_or_path):
+        raise InputError(
+            f"{name_or_path} is an identification, not an experiment",
+            hint=f"Start it with: tcrctl identify {name_or_path}",
+        )
+    return _find("experiment", name_or_path, experiments(), Path())
+
+
+def find_identification(name_or_path: str) -> Path:
+    """Return the file of an identification.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+
+    Raises:
+        UnknownNameError: If there is no shipped identification of that name.
+        InputError: If the path leads to no file.
+    """
+    return _find("identification", name_or_path, identifications(), Path())
+
+
+def find_robot(name_or_path: str, folder: Path | None = None) -> Path:
+    """Return the file of a robot.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+        folder: Where a relative path starts; the working directory if left out.
+
+    Raises:
+        UnknownNameError: If there is no shipped robot of that name.
+        InputError: If the path leads to no file.
+    """
+    return _find("robot", name_or_path, robots(), folder or Path())
+
+
+def find_rig(name_or_path: str, folder: Path | None = None) -> Path:
+    """Return the file of a rig.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+        folder: Where a relative path starts; if there is nothing, the working directory is tried.
+
+    Raises:
+        UnknownNameError: If there is no shipped rig of that name.
+        InputError: If the path leads to no file.
+    """
+    if folder is not None and is_path(name_or_path) and (folder / Path(name_or_path).expanduser()).is_file():
+        return folder / Path(name_or_path).expanduser()
+    return _find("rig", name_or_path, rigs(), Path())
+
+
+def is_identification(name_or_path: str) -> bool:
+    """Whether a shipped name or a file is an identification; False if there is none or it cannot be read."""
+    from tcrctl.config import strict_yaml
+
+    if not is_path(name_or_path):
+        return name_or_path in identifications()
+    try:
+        data = strict_yaml.load(Path(name_or_path).expanduser()).data
+    except InputError:
+        return False
+    return isinstance(data, dict) and data.get("kind") == "identification"
+
+
+def is_path(name_or_path: str) -> bool:
+    """Tell a path (has a separator or ends in .yaml, .yml) from a shipped name."""
+    return "/" in name_or_path or "\\" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
+
+
+def _by_name(folder: Path) -> dict[str, Path]:
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def _find(kind: str, name_or_path: str, shipped: Mapping[str, Path], folder: Path) -> Path:
+    if is_path(name_or_path):
+        path = folder / Path(name_or_path).expanduser()
+        if not path.is_file():
+            raise InputError(f"{path}: there is no such file")
+        return path
+    if name_or_path not in shipped:
+        raise UnknownNameError(kind, name_or_path, list(shipped))
+    return shipped[name_or_path]

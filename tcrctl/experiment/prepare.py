@@ -1,0 +1,264 @@
+"""An experiment file becomes a robot, a trajectory, a plant, an estimator and a controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from tcrctl.controller.controller import Controller, build_controller
+from tcrctl.controller.settings import IocSettings, OpenLoopSettings
+from tcrctl.errors import InputError, StoppedError
+from tcrctl.estimator.estimator import Estimator, build_estimator
+from tcrctl.estimator.exact import State
+from tcrctl.experiment.compilation import announced_compilation
+from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
+from tcrctl.experiment.metrics import Metrics
+from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
+from tcrctl.loop.loop import run_loop, step_count
+from tcrctl.loop.pacing import Unpaced
+from tcrctl.loop.safety import SafetyLimits
+from tcrctl.plant.plant import Plant, RunnablePlant
+from tcrctl.plant.rig.bench import build_rig
+from tcrctl.plant.rig.session import Session
+from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plant.simulated import SimulatedPlant
+from tcrctl.robot import pose
+from tcrctl.robot.model import FIXED
+from tcrctl.robot.robot import Robot, build_robot
+from tcrctl.signals import Array, StepRecord
+from tcrctl.task.task import Task, build_task, task_targets
+from tcrctl.trajectory.start_blend import StartBlend
+from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
+
+#: Measurements that are averaged to find where the robot is before it moves.
+START_READS: Final = 10
+#: Steps of the rehearsal that loads every kernel.
+WARM_UP_STEPS: Final = 3
+
+Notify = Callable[[str], None]
+PlantBuilder = Callable[["Experiment", Session], tuple[RunnablePlant, State | None]]
+
+
+def silent(text: str) -> None:
+    """Take a message for the user and drop it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """An experiment, built as far as it can be without a plant.
+
+    Attributes:
+        loaded: The files it came from.
+        spec: What they say, with the seed in use.
+        robot: The robot that the controller knows.
+        trajectory: What is wanted.
+    """
+
+    loaded: LoadedSpec
+    spec: ExperimentSpec
+    robot: Robot
+    trajectory: Trajectory
+
+    @property
+    def period(self) -> float:
+        """Control period [s]."""
+        return float(self.spec.controller.period_s)
+
+    @property
+    def steps(self) -> int:
+        """Control steps of a whole run."""
+        return step_count(self.trajectory.duration, self.period)
+
+    @property
+    def paced(self) -> bool:
+        """Whether the clock paces every run: a rig cannot be told to wait."""
+        return self.loaded.rig is not None
+
+    @property
+    def safety(self) -> SafetyLimits:
+        """When a run is stopped."""
+        return SafetyLimits(1e-3 * self.spec.safety.position_error_mm, self.robot.tension_limit)
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What one run is made of; every run needs new ones.
+
+    Attributes:
+        trajectory: What is wanted, beginning where the plant is.
+        plant: Is measured and driven.
+        estimator: Finds the state.
+        controller: Finds the command.
+        start_offset: Distance of the measured start from that of the trajectory [m]; NaN if the cameras do
+            not see the tip ring, so that it is not known.
+    """
+
+    trajectory: Trajectory
+    plant: RunnablePlant
+    estimator: Estimator
+    controller: Controller
+    start_offset: float
+
+
+def _simulated(experiment: Experiment, session: Session) -> tuple[RunnablePlant, State]:
+    del session
+    spec = experiment.spec
+    if not isinstance(spec.plant, SimulatedSettings):
+        raise InputError(f"plant.kind is {spec.plant.kind}, not simulated")
+    plant = SimulatedPlant(spec.plant, experiment.robot, experiment.period, spec.seed)
+    return plant, plant.state
+
+
+def _rig(experiment: Experiment, session: Session) -> tuple[RunnablePlant, None]:
+    if experiment.loaded.rig is None:
+        raise InputError("the experiment was loaded without a rig file")
+    return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, session), None
+
+
+#: Plant, and its true state if it knows it, for every ``plant.kind``.
+PLANTS: Final[Mapping[str, PlantBuilder]] = {"simulated": _simulated, "rig": _rig}
+
+
+def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = silent) -> Experiment:
+    """Build robot and trajectory, and rehearse a few steps so that no kernel is compiled or loaded in a run.
+
+    Args:
+        loaded: The experiment.
+        seed: Seed of everything random; that of the experiment if None.
+        notify: Takes messages for the user.
+
+    Raises:
+        InputError: If robot, trajectory and controller do not go together.
+        NoEquilibriumError: If the robot has no stable shape.
+    """
+    changes: dict[str, Any] = {} if seed is None else {"seed": seed}
+    spec = loaded.spec.model_copy(update=changes)
+    with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
+        robot = build_robot(loaded.robot)
+        trajectory = make_trajectory(spec, robot)
+        tracks = None if isinstance(spec.controller, OpenLoopSettings) else spec.controller.output
+        if tracks == "pose" and trajectory.normal(np.zeros(1)) is None:
+            raise InputError(
+                f"{loaded.path}: controller.output: pose needs a trajectory with an orientation; "
+                f"trajectory.kind: {spec.trajectory.kind} leaves it free"
+            )
+        experiment = Experiment(loaded, spec, robot, trajectory)
+        _rehearse(experiment)
+    return experiment
+
+
+def make_trajectory(spec: ExperimentSpec, robot: Robot) -> Trajectory:
+    """Build the trajectory of an experiment, to the targets of its task if it has one.
+
+    Raises:
+        NoEquilibriumError: If drive lengths are given with which the robot has no stable shape.
+    """
+    targets = task_targets(spec.task, spec.seed) if spec.task else {}
+    return build_trajectory(spec.trajectory, robot, targets)
+
+
+def plan(experiment: Experiment) -> StaticPath:
+    """Find the drives along the trajectory, or take those that it gives, held against all limits.
+
+    Raises:
+        InfeasibleError: If the robot cannot follow.
+    """
+    robot, controller = experiment.robot, experiment.spec.controller
+    tension = controller.tension if isinstance(controller, IocSettings) else None
+    limits = DriveLimits(
+        speed=controller.speed_limit_mm_s * 1e-3,
+        floor=0.0 if tension is None else tension.floor_n,
+        ceiling=robot.tension_limit if tension is None else tension.ceiling_n,
+    )
+    if isinstance(controller, OpenLoopSettings):
+        return check_drives(experiment.trajectory, robot, limits)
+    return check_feasibility(experiment.trajectory, robot, limits)
+
+
+def make_task(experiment: Experiment) -> Task | None:
+    """Build what judges a run by its task, if the experiment has one; every run needs a new one."""
+    spec, modules = experiment.spec, experiment.loaded.robot.modules
+    return build_task(spec.task, spec.seed, 1e-3 * modules.rod_diameter_mm) if spec.task else None
+
+
+def build_plant(experiment: Experiment, session: Session | None = None) -> tuple[RunnablePlant, State | None]:
+    """Build the plant; returns its true state too if it knows it.
+
+    Args:
+        experiment: What it is for.
+        session: What the plant may know of the run.
+
+    Raises:
+        DeviceError: If it cannot be reached.
+        InputError: If a rig does not do what its file says.
+    """
+    return PLANTS[experiment.spec.plant.kind](experiment, session or Session())
+
+
+def build_parts(experiment: Experiment, plant: RunnablePlant, state: State | None) -> Parts:
+    """Build estimator and controller for a plant at rest, and let the trajectory begin where the plant is.
+
+    Args:
+        experiment: The experiment.
+        plant: Is measured, not driven.
+        state: Its true positions and velocities if it knows them.
+
+    Raises:
+        InputError: If the estimator needs a state that is not known.
+        DeviceError: If the plant cannot be measured.
+    """
+    spec, robot = experiment.spec, experiment.robot
+    trajectory, offset = experiment.trajectory, np.nan
+    found = measured_pose(plant, robot)
+    if found is not None:
+        offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))
+        trajectory = StartBlend(trajectory, *found, spec.start.blend_s, spec.start.approach)
+    estimator = build_estimator(spec.estimator, robot, experiment.period, state)
+    return Parts(trajectory, plant, estimator, build_controller(spec.controller, robot), offset)
+
+
+def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple[Array, Array] | None:
+    """End position (3,) [m] and normal (3,) as the cameras see them, averaged; None if they do not see them.
+
+    Args:
+        plant: At rest.
+        robot: Says which nodes are the tip ring.
+        reads: How many measurements are averaged.
+    """
+    tip = 3 * (robot.tip // FIXED - 1)  # rings are measured from the first free one on
+    seen = [plant.read() for _ in range(reads)]
+    rings = [m.nodes[tip : tip + 3].astype(float) for m in seen if m.valid[tip : tip + 3].all()]
+    if not rings:
+        return None
+    ring = np.mean(rings, axis=0).ravel()
+    return pose.position(ring, 0), pose.normal(ring, 0)
+
+
+def _rehearse(experiment: Experiment) -> None:
+    """Run a few steps with parts of its own, in simulation, so that nothing of the run itself is touched."""
+    simulated = SimulatedSettings(kind="simulated")
+    plant = SimulatedPlant(simulated, experiment.robot, experiment.period, experiment.spec.seed)
+    parts, metrics = build_parts(experiment, plant, plant.state), Metrics(WARM_UP_STEPS, paced=False)
+    task = make_task(experiment)
+
+    def record(step: StepRecord) -> None:
+        metrics.add(step)
+        if task is not None:
+            task.observe(step)
+
+    with suppress(StoppedError):  # a run that ends so shall do it with a log
+        run_loop(
+            parts.trajectory,
+            parts.estimator,
+            parts.controller,
+            plant,
+            record,
+            period=experiment.period,
+            duration=WARM_UP_STEPS * experiment.period,
+            pace=Unpaced(),
+            limits=SafetyLimits(np.inf, np.inf, WARM_UP_STEPS + 1),
+        )

@@ -1,0 +1,112 @@
+"""What a log says about where it comes from: files, versions, machine."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+import socket
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from tcrctl import __version__
+from tcrctl.config import strict_yaml
+from tcrctl.experiment.run_folder import RESOLVED, SPEC
+from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
+
+ROBOT: Final = "robot.yaml"
+RIG: Final = "rig.yaml"
+VERSIONS: Final = "versions.json"
+_PACKAGES: Final = (
+    "foxglove-schemas-protobuf", "llvmlite", "mcap", "numba", "numpy", "protobuf", "pydantic", "pyyaml", "scipy",
+)  # fmt: skip
+
+
+def resolved_text(spec: ExperimentSpec) -> bytes:
+    """An experiment as a file with every default filled in and ``--set`` applied."""
+    return strict_yaml.dumps(spec.model_dump(mode="json")).encode()
+
+
+def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str, bytes]]:
+    """Media type and content of the files that a log carries, by name.
+
+    Args:
+        loaded: The experiment as it was given.
+        spec: As it runs.
+
+    Raises:
+        InputError: If the robot's file has gone.
+    """
+    rig = {} if loaded.rig is None else {RIG: ("application/yaml", loaded.rig.given)}
+    return {
+        SPEC: ("application/yaml", loaded.given_text),
+        RESOLVED: ("application/yaml", resolved_text(spec)),
+        ROBOT: ("application/yaml", strict_yaml.read(loaded.robot_path)),
+        **rig,
+        VERSIONS: ("application/json", json.dumps(versions(), indent=2).encode()),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that the numbers of a run depend on, and a digest of this program's source."""
+    import llvmlite.binding as llvm  # heavy
+
+    cpu = llvm.get_host_cpu_name()  # type: ignore[no-untyped-call]  # decides what kernels are compiled to
+    found = {
+        "tcrctl": __version__,
+        "source_sha256": source_digest(),
+        "python": sys.version.split()[0],
+        "platform": platform.platform(),
+        "processor": processor(),
+        "cpu": cpu,
+        "numba_opt": os.environ.get("NUMBA_OPT", "default"),
+    }
+    for package in _PACKAGES:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            found[package] = "unknown"
+    return found
+
+
+def processor() -> str:
+    """Model name of the processor, or of its kind if the system does not say."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    named = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+    return named or platform.processor() or platform.machine()
+
+
+def source_digest() -> str:
+    """SHA-256 over the names and contents of all Python files of the package."""
+    digest, package = hashlib.sha256(), Path(__file__).parents[1]
+    for path in sorted(package.rglob("*.py")):
+        digest.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def start_metadata(
+    run_id: str, loaded: LoadedSpec, spec: ExperimentSpec, *, realtime: bool
+) -> Mapping[str, str]:
+    """Who, when and what, for the start record of a log."""
+    return {
+        "run_id": run_id,
+        "spec": spec.name,
+        "robot": loaded.robot.name,
+        "plant": spec.plant.kind,
+        "controller": spec.controller.kind,
+        "estimator": spec.estimator.kind,
+        "seed": str(spec.seed),
+        "overrides": json.dumps(loaded.overrides),
+        "realtime": json.dumps(realtime),
+        "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "host": socket.gethostname(),
+        "version": __version__,
+    }

@@ -1,0 +1,265 @@
+"""Composition root: a prepared experiment is run and recorded, and leaves a folder with log and summary.
+
+LoadedSpec -> prepare -> plan -> run_experiment: folder, log, parts -> loop -> summary -> stop record
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedError, TcrctlError
+from tcrctl.experiment.metrics import Metrics
+from tcrctl.experiment.prepare import Experiment, Notify, Parts, build_parts, build_plant, make_task, silent
+from tcrctl.experiment.provenance import attachments, resolved_text, start_metadata
+from tcrctl.experiment.run_folder import (
+    LOG,
+    RESOLVED,
+    SPEC,
+    SUMMARY,
+    RunFolder,
+    check_writable,
+    make_run_folder,
+)
+from tcrctl.experiment.summary import Summary, Verdict, judge
+from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.mcap_file import Tap
+from tcrctl.log.writer import LogWriter
+from tcrctl.loop.interruption import Interruption
+from tcrctl.loop.loop import run_loop, step_count
+from tcrctl.loop.pacing import Pace, RealTime, Unpaced
+from tcrctl.loop.quiet import quiet_interpreter
+from tcrctl.plant.rig.journal import Journal
+from tcrctl.plant.rig.session import Session
+from tcrctl.robot.model import FIXED, RIGID_BARS, ring_rows
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import StepRecord
+from tcrctl.trajectory.trajectory import Trajectory
+
+#: Points of the drawn path of the reference: as far apart in time as this [s], but no more than these.
+PATH_SPACING_S: Final = 0.1
+MOST_PATH_POINTS: Final = 1000
+
+Progress = Callable[[int, int], None]
+
+
+def _no_progress(done: int, total: int) -> None:
+    """Show nothing."""
+
+
+def run_experiment(
+    experiment: Experiment,
+    *,
+    out: Path,
+    realtime: bool = False,
+    confirmed: bool = False,
+    notify: Notify = silent,
+    progress: Progress = _no_progress,
+    tap: Tap | None = None,
+) -> Summary:
+    """Run an experiment and record it.
+
+    However the run ends, the plant is left safe, the log is finished and the signals are given back.
+
+    Args:
+        experiment: What :func:`tcrctl.experiment.prepare.prepare` made.
+        out: Where the run's folder is made.
+        realtime: Pace a simulated plant by the clock; a rig is always paced.
+        confirmed: The operator has agreed that the rig moves; without it a rig is measured, not armed.
+        notify: Takes messages for the user.
+        progress: Takes the number of steps done and their total, after every step.
+        tap: Takes every message of the log, in the log's thread; see :class:`tcrctl.view.live.LiveView`.
+
+    Returns:
+        The result; also of a run that was stopped by a limit, a signal or a device.
+
+    Raises:
+        DeviceError: If the run cannot be recorded or the plant not be reached; no folder is left behind.
+    """
+    check_writable(out)
+    realtime = realtime or experiment.paced
+    with Interruption() as interruption:
+        pace = RealTime(experiment.period, interruption.check) if realtime else Unpaced(interruption.check)
+        journal = Journal(pace.time, notify)
+        plant, state = build_plant(experiment, Session(pace.time, journal.report, confirmed))
+        try:
+            parts = build_parts(experiment, plant, state)
+            folder = make_run_folder(out, experiment.spec.name)
+            log = _open_log(experiment, folder, realtime=realtime, tap=tap)
+            journal.attach(log.event)
+            approach = parts.trajectory.duration - experiment.trajectory.duration
+            journal.report("start", *_start_message(parts.start_offset, approach))
+        except BaseException:
+            plant.close()
+            raise
+        summary = _recorded_run(experiment, parts, pace, folder, log, progress)
+    try:
+        folder.write(SUMMARY, (json.dumps(summary.as_json(), indent=2) + "\n").encode())
+    except DeviceError as error:  # the run is over and in the log
+        notify(f"warning: {error}")
+    return summary
+
+
+def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap: Tap | None) -> LogWriter:
+    """Write what is known before the first step; on failure the folder is as if it had never been."""
+    spec, loaded = experiment.spec, experiment.loaded
+    try:
+        folder.write(SPEC, loaded.given_text)
+        folder.write(RESOLVED, resolved_text(spec))
+        return LogWriter(
+            folder.path / LOG,
+            attachments=attachments(loaded, spec),
+            start=start_metadata(folder.run_id, loaded, spec, realtime=realtime),
+            geometry=log_geometry(experiment.robot, experiment.trajectory),
+            epoch_ns=time.time_ns(),
+            period_s=experiment.period,
+            flush_s=spec.log.flush_s,
+            flush_steps=spec.log.flush_steps,
+            full_state_s=spec.full_state_s,
+            fsync=spec.log.fsync,
+            wait_when_full=not realtime,
+            tap=tap,
+        )
+    except BaseException:
+        folder.discard()
+        raise
+
+
+def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeometry:
+    """Return the names and the topology that the log needs to draw a robot, and the path of its end."""
+    model, routes = robot.model, []
+    for c, name in enumerate(robot.cable_names):
+        holes = slice(model.first_hole[c], model.first_hole[c + 1])
+        routes.append(CableRoute(name, model.hole_nodes[holes], model.hole_weights[holes]))
+    duration = 0.0 if trajectory is None else trajectory.duration
+    points = np.linspace(0.0, duration, min(MOST_PATH_POINTS, 2 + int(duration / PATH_SPACING_S)))
+    return LogGeometry(
+        robot.n_modules,
+        tuple(routes),
+        tuple(ring_rows(robot.n_modules)),
+        robot.tip // FIXED,
+        springs=model.bar_nodes[RIGID_BARS * robot.n_modules :],
+        reference_path=np.zeros((0, 3)) if trajectory is None else trajectory.position(points),
+    )
+
+
+def _recorded_run(
+    experiment: Experiment, parts: Parts, pace: Pace, folder: RunFolder, log: LogWriter, progress: Progress
+) -> Summary:
+    """Run, close the plant, finish the log."""
+    steps = step_count(parts.trajectory.duration, experiment.period)
+    metrics, task = Metrics(steps, paced=isinstance(pace, RealTime)), make_task(experiment)
+
+    def record(step: StepRecord) -> None:
+        log.step(step)
+        metrics.add(step)
+        for event in () if task is None else task.observe(step):
+            log.event(event.t, event.kind, event.level, event.message)
+        progress(step.k + 1, steps)
+
+    with log:
+        failure = _drive(experiment, parts, pace, record, log)
+        summary = _summary(experiment, folder, metrics, {} if task is None else task.result(), failure)
+        try:
+            if failure is not None:
+                kind = "limit" if isinstance(failure, StoppedError) else "stop"
+                log.event(summary.measures.duration_s, kind, "error", str(failure))
+            stop = {"status": summary.status, "reason": summary.reason}
+            log.finish({**stop, "summary": json.dumps(summary.as_json())})
+        except LogError as error:
+            if failure is None:
+                summary = replace(summary, status="error", reason=str(error), exit_code=error.exit_code)
+    return summary
+
+
+def _drive(
+    experiment: Experiment, parts: Parts, pace: Pace, record: Callable[[StepRecord], None], log: LogWriter
+) -> TcrctlError | None:
+    """Go through all steps and leave the plant safe; return why it ended before the end, if it did."""
+    failure: TcrctlError | None = None
+    try:
+        with _pace_kept(experiment, pace, log):
+            parts.plant.start()
+            run_loop(
+                parts.trajectory,
+                parts.estimator,
+                parts.controller,
+                parts.plant,
+                record,
+                period=experiment.period,
+                duration=parts.trajectory.duration,
+                pace=pace,
+                limits=experiment.safety,
+            )
+    except TcrctlError as error:
+        failure = error
+    finally:
+        try:
+            parts.plant.close()
+        except TcrctlError as error:  # what ended the run first is the reason
+            failure = failure or error
+    return failure
+
+
+def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractContextManager[None]:
+    """A quiet interpreter for runs that the clock paces."""
+    if not isinstance(pace, RealTime):
+        return nullcontext()
+    rig = experiment.loaded.rig
+    priority = None if rig is None else rig.rig.fifo_priority
+    return quiet_interpreter(priority, lambda text: log.event(0.0, "start", "warning", text))
+
+
+def _start_message(offset: float, approach: float) -> tuple[str, str]:
+    """Level and text of what is known about the start: offset [m], and time [s] that the way there takes."""
+    if math.isnan(offset):
+        return (
+            "warning",
+            "the tip ring is not measured: the run begins at the trajectory's start, not the robot's",
+        )
+    beside = f"the robot starts {1e3 * offset:.3f} mm beside the trajectory"
+    return ("warning", f"{beside} and first goes there, {approach:.1f} s") if approach else ("info", beside)
+
+
+def _summary(
+    experiment: Experiment,
+    folder: RunFolder,
+    metrics: Metrics,
+    task: dict[str, Any],
+    failure: TcrctlError | None,
+) -> Summary:
+    spec = experiment.spec
+    summary = Summary(
+        run_id=folder.run_id,
+        spec=spec.name,
+        robot=experiment.robot.name,
+        plant=spec.plant.kind,
+        controller=spec.controller.kind,
+        status="success",
+        reason="",
+        exit_code=0,
+        measures=metrics.measures(),
+        criteria=(),
+        log=folder.path / LOG,
+        task=task,
+    )
+    verdicts = judge(spec.criteria, summary.as_json())
+    status, reason, exit_code = _outcome(failure, verdicts)
+    return replace(summary, criteria=verdicts, status=status, reason=reason, exit_code=exit_code)
+
+
+def _outcome(failure: TcrctlError | None, verdicts: tuple[Verdict, ...]) -> tuple[str, str, int]:
+    """Status, reason and exit code of a run."""
+    if failure is not None:
+        aborted = isinstance(failure, StoppedError | RunInterruptedError)
+        return "aborted" if aborted else "error", str(failure), failure.exit_code
+    missed = [str(verdict) for verdict in verdicts if not verdict.passed]
+    return ("failed", "; ".join(missed), 3) if missed else ("success", "", 0)

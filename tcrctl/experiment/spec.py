@@ -1,0 +1,271 @@
+"""The experiment file: which robot, which trajectory, which controller, which plant.
+
+SPEC (name or path) -> strict YAML -> --set -> ExperimentSpec + RobotDescription -> LoadedSpec
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+from pydantic import Field, model_validator
+
+from tcrctl.config import shipped, strict_yaml
+from tcrctl.config.kind_switch import without_former_keys
+from tcrctl.config.settings import Path as Keys
+from tcrctl.config.settings import Settings, quantity, refuse
+from tcrctl.controller.settings import ControllerSettings, IocSettings
+from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
+from tcrctl.experiment.criterion import CriterionText
+from tcrctl.experiment.summary import TASK, UNITS
+from tcrctl.plant.rig.file import LoadedRig, load_rig
+from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings, rings_named
+from tcrctl.robot.description import RobotDescription, cable_routes
+from tcrctl.robot.sections import Name
+from tcrctl.task.settings import TaskSettings
+from tcrctl.trajectory.drive_settings import DrivesSettings
+from tcrctl.trajectory.settings import TrajectorySettings, named_targets
+
+#: Control rate up to which ``full_state_s: auto`` means every step [Hz].
+_RICH_RATE_HZ: Final = 20.0
+
+
+class LogSettings(Settings):
+    """How much of the steps is logged, and how often it reaches the disk: at the earlier of the two intervals."""
+
+    flush_s: float = quantity("s", "longest time between two flushes", 0.5, gt=0)
+    flush_steps: int = Field(default=500, ge=1, description="most control steps between two flushes")
+    fsync: bool = Field(default=False, description="wait until the disk has the data, against power failure")
+    full_state_s: Literal["auto"] | Annotated[float, Field(ge=0)] = quantity(
+        "s",
+        "time between two steps with all node positions, velocities and forces (0: every step), which replay "
+        "computes again; auto: every step at up to 20 Hz, else 1 s",
+        "auto",
+    )
+
+    def full_state(self, period: float) -> float:
+        """Time between two steps that are logged in full at a control period [s]; 0: every step."""
+        if self.full_state_s != "auto":
+            return self.full_state_s
+        return 0.0 if period * _RICH_RATE_HZ > 1.0 - 1e-9 else 1.0
+
+
+class SafetySettings(Settings):
+    """When a run is stopped, beside the robot's tension limit and two unsolved steps in a row."""
+
+    position_error_mm: float = quantity("mm", "largest distance between estimated and wanted end", 60.0, gt=0)
+
+
+class StartSettings(Settings):
+    """How the wanted pose gets from where the robot really is to the trajectory."""
+
+    blend_s: float = quantity(
+        "s", "time in which the offset of the start pose fades out; 0: begin with a step", 2.0, ge=0
+    )
+    approach_mm_s: float = quantity(
+        "mm/s", "if fading would be faster, the robot first goes to the start at this speed", 20.0, gt=0
+    )
+
+    @property
+    def approach(self) -> float:
+        """``approach_mm_s`` in m/s."""
+        return 1e-3 * self.approach_mm_s
+
+
+class ExperimentSpec(Settings):
+    """One experiment, every default filled in."""
+
+    name: Name
+    description: str = Field(default="", description="one line for listings")
+    source: str = Field(default="", description="where the experiment comes from, for instance a figure")
+    robot: str = Field(
+        description="shipped robot, or path of a robot file relative to this one", min_length=1
+    )
+    seed: int = Field(default=0, ge=0, lt=2**63, description="seed of everything random")
+    trajectory: TrajectorySettings
+    controller: ControllerSettings
+    estimator: EstimatorSettings = PassiveObserverSettings(kind="passive_observer")
+    plant: PlantSettings
+    task: TaskSettings | None = Field(default=None, description="what the run is for, if it has a task")
+    criteria: tuple[CriterionText, ...] = Field(
+        default=(), description="what the run must achieve, else exit code 3"
+    )
+    safety: SafetySettings = SafetySettings()
+    start: StartSettings = StartSettings()
+    log: LogSettings = LogSettings()
+
+    @property
+    def full_state_s(self) -> float:
+        """Time between two steps that are logged in full [s]; an exact state is input, so every step has to be."""
+        exact = isinstance(self.estimator, ExactSettings)
+        return 0.0 if exact else self.log.full_state(self.controller.period_s)
+
+    @model_validator(mode="after")
+    def _sections_agree(self) -> ExperimentSpec:
+        refuse(_disagreements(self))
+        return self
+
+
+def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+    results = [*UNITS, *(TASK + name for name in (spec.task.result_names if spec.task else ()))]
+    for i, criterion in enumerate(spec.criteria):
+        if criterion.name not in results:
+            known = ", ".join(difflib.get_close_matches(criterion.name, results, n=3, cutoff=0.3) or results)
+            yield ("criteria", i), f"a run has no result {criterion.name}; known: {known}"
+    yield from _target_disagreements(spec)
+    if spec.controller.kind == "open_loop" and spec.trajectory.kind != "drives":
+        yield (
+            ("trajectory", "kind"),
+            f"must be drives with controller.kind: open_loop, not {spec.trajectory.kind}",
+        )
+    if not isinstance(spec.plant, SimulatedSettings):
+        return
+    step, period = spec.plant.step_ms, spec.controller.period_s
+    steps = period * 1e3 / step
+    if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
+        what = f"{period:g} s must be a whole number of steps; with {step:g} ms it is {steps:g}"
+        yield ("plant", "step_ms"), f"a control period of {what}"
+
+
+def _target_disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+    targets = spec.task.target_names if spec.task else ()
+    for keys, name in named_targets(spec.trajectory):
+        if spec.task is None:
+            yield ("trajectory", *keys), f"there is no task with a target {name}; the experiment has none"
+        elif name not in targets:
+            yield ("trajectory", *keys), f"the task has no target {name}; it has {', '.join(targets)}"
+
+
+def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+    """Yield path and message of what the experiment asks and the robot does not have.
+
+    Args:
+        spec: The experiment.
+        robot: Its robot.
+    """
+    count = robot.modules.count
+    for keys, ring in rings_named(spec.plant):
+        if ring > count:
+            yield ("plant", *keys), f"there is no ring {ring}; {robot.name} has rings 1 to {count}"
+    yield from _drive_misfits(spec, robot)
+    tension = spec.controller.tension if isinstance(spec.controller, IocSettings) else None
+    if tension is not None and tension.ceiling_n > robot.tension_limit_n:
+        limit = f"tension_limit_n of {robot.name}, {robot.tension_limit_n:g}"
+        yield ("controller", "tension", "ceiling_n"), f"must be at most {limit}, not {tension.ceiling_n:g}"
+
+
+def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+    legs = spec.trajectory.legs if isinstance(spec.trajectory, DrivesSettings) else ()
+    given: list[tuple[Keys, tuple[float, ...]]] = [
+        (("trajectory", "legs", i, "drives_mm"), leg.drives_mm) for i, leg in enumerate(legs)
+    ]
+    start = spec.plant.start_drives_mm if isinstance(spec.plant, SimulatedSettings) else None
+    if start is not None:
+        given.append((("plant", "start_drives_mm"), start))
+    names = [route.name for route in cable_routes(robot)]
+    for keys, lengths in given:
+        if len(lengths) != len(names):
+            has = f"{robot.name} has {len(names)} cables, {', '.join(names)}"
+            yield keys, f"{has}; there are {len(lengths)} lengths"
+    low, high = robot.stroke_mm
+    for c, length in enumerate(start or ()):
+        if not low <= length <= high:
+            yield (
+                ("plant", "start_drives_mm", c),
+                f"must be within stroke_mm, {low:g} to {high:g}, not {length:g}",
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedSpec:
+    """An experiment ready to run, and where it came from.
+
+    Attributes:
+        spec: The experiment.
+        robot: Its robot.
+        given_text: The file as it is on disk.
+        path: The file.
+        robot_path: File of the robot.
+        overrides: ``--set`` arguments, already applied.
+        rig: The bench, for ``plant.kind: rig``.
+        notes: What the user should know about how the file was read.
+    """
+
+    spec: ExperimentSpec
+    robot: RobotDescription
+    given_text: bytes
+    path: Path
+    robot_path: Path
+    overrides: tuple[str, ...]
+    rig: LoadedRig | None = None
+    notes: tuple[str, ...] = ()
+
+
+def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
+    """Read an experiment and its robot.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+        overrides: Assignments ``a.b=c`` as given to ``--set``, applied in order.
+
+    Raises:
+        UnknownNameError: If there is no shipped experiment of that name.
+        SpecError: If the experiment or its robot has problems; all of both are listed.
+        InputError: If a file is missing.
+    """
+    path = shipped.find_experiment(name_or_path)
+    given = strict_yaml.read(path)
+    document = strict_yaml.loads(given, str(path))
+    written = document.data
+    document, problems = _overridden(document, overrides)
+    document, notes = without_former_keys(document, written, ExperimentSpec)
+    spec, robot, robot_path = _validated(document, path.parent, problems)
+    problems = [
+        Problem(document.where(keys), ".".join(map(str, keys)), message)
+        for keys, message in misfits(spec, robot)
+    ]
+    if problems:
+        raise SpecError(problems)
+    rig = load_rig(spec.plant.rig, robot, path.parent) if isinstance(spec.plant, RigSettings) else None
+    return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, notes)
+
+
+def _overridden(
+    document: strict_yaml.Document, overrides: Sequence[str]
+) -> tuple[strict_yaml.Document, list[Problem]]:
+    """Return the document with all overrides that can be applied, and why the others cannot."""
+    problems: list[Problem] = []
+    for assignment in overrides:
+        try:
+            document = strict_yaml.override(document, assignment)
+        except SpecError as error:
+            problems += error.problems
+    return document, problems
+
+
+def _validated(
+    document: strict_yaml.Document, folder: Path, problems: list[Problem]
+) -> tuple[ExperimentSpec, RobotDescription, Path]:
+    """Return experiment and robot, or raise the problems of both after those already known."""
+    robot, robot_path = None, Path()
+    try:
+        spec = strict_yaml.validate(document, ExperimentSpec)
+    except SpecError as error:
+        problems += error.problems
+    name = document.data.get("robot") if isinstance(document.data, dict) else None
+    if isinstance(name, str) and name:
+        try:
+            at_hand = document.where(("robot",)).startswith("--set")  # relative to where the user is
+            robot_path = shipped.find_robot(name, Path() if at_hand else folder)
+            robot = strict_yaml.validate(strict_yaml.load(robot_path), RobotDescription)
+        except SpecError as error:
+            problems += error.problems
+        except InputError as error:
+            problems.append(Problem(document.where(("robot",)), "robot", str(error)))
+    if problems or robot is None:
+        raise SpecError(problems)
+    return spec, robot, robot_path

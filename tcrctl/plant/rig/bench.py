@@ -1,0 +1,131 @@
+"""A rig file becomes a plant: cameras and drives are connected, and held against what the file says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tcrctl.errors import InputError
+from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.plant import RigLimits, RigPlant
+from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
+from tcrctl.plant.rig.settings import MountedRobot, SafetyRules
+from tcrctl.plant.rig.sight import Rules
+from tcrctl.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from tcrctl.plant.rig.modbus_drives import ModbusDrives
+    from tcrctl.plant.rig.natnet_cameras import NatNetCameras
+
+
+def envelope(mounted: MountedRobot, rules: SafetyRules, names: tuple[str, ...]) -> DriveEnvelope:
+    """Return the limits of the set-points.
+
+    Args:
+        mounted: Section of the rig file.
+        rules: Safety section.
+        names: Cables in the order of the drives.
+    """
+    cables = [mounted.cables[name] for name in names]
+    acceleration = rules.acceleration_limit_mm_s2
+    return DriveEnvelope(
+        names=names,
+        low=np.array([round(1e3 * cable.min_mm) for cable in cables]),
+        high=np.array([round(1e3 * cable.max_mm) for cable in cables]),
+        step=np.full(len(cables), int(1e3 * rules.max_step_mm)),
+        speed=np.array([1e3 * cable.speed_limit_mm_s for cable in cables]),
+        acceleration=np.full(len(cables), np.inf if acceleration is None else 1e3 * acceleration),
+        groups=tuple(
+            AntagonistGroup(
+                tuple(names.index(name) for name in group.cables),
+                round(1e3 * group.min_sum_mm),
+                round(1e3 * group.max_sum_mm),
+            )
+            for group in mounted.antagonists
+        ),
+    )
+
+
+def supervisor_rules(rules: SafetyRules) -> Rules:
+    """Return the safety section in seconds and micrometres."""
+    return Rules(
+        stale=rules.stale_after_ms / 1e3,
+        stale_stop=rules.stale_stop_ms / 1e3,
+        silence=rules.silence_stop_ms / 1e3,
+        rejects=rules.max_rejects,
+        following=round(1e3 * rules.following_mm),
+        standstill=rules.standstill_s,
+    )
+
+
+def connect_cameras(loaded: LoadedRig, robot: Robot) -> NatNetCameras:
+    """Connect to the cameras of a rig.
+
+    Raises:
+        DeviceError: If they do not answer.
+        InputError: If they do not know the markers that the rig file names.
+    """
+    from tcrctl.plant.rig.natnet_cameras import NatNetCameras
+
+    mounted = loaded.mounted
+    return NatNetCameras(loaded.rig.cameras, mounted.markers, mounted.calibration, robot)
+
+
+def connect_drives(loaded: LoadedRig, names: tuple[str, ...]) -> ModbusDrives:
+    """Connect to the drives of a rig; nothing is written.
+
+    Raises:
+        DeviceError: If the PLC does not answer.
+        InputError: If it is not what the rig file says.
+    """
+    from tcrctl.plant.rig.modbus_drives import ModbusDrives
+
+    return ModbusDrives(loaded.mounted, names)
+
+
+def build_rig(loaded: LoadedRig, robot: Robot, period: float, session: Session) -> RigPlant:
+    """Connect to a rig; nothing moves before it is started.
+
+    Args:
+        loaded: The rig file.
+        robot: The robot that hangs there.
+        period: Control period [s].
+        session: The run.
+
+    Raises:
+        DeviceError: If cameras or drives do not answer.
+        InputError: If they are not what the rig file says, or the period is impossible.
+    """
+    rules = loaded.rig.safety
+    _check_period(rules, period)
+    cameras = connect_cameras(loaded, robot)
+    try:
+        drives = connect_drives(loaded, robot.cable_names)
+        try:
+            drives.check(rules, period)
+        except BaseException:
+            drives.close()
+            raise
+    except BaseException:
+        cameras.close()
+        raise
+    limits = RigLimits(
+        envelope=envelope(loaded.mounted, rules, robot.cable_names),
+        rules=supervisor_rules(rules),
+        min_seen=rules.min_seen_fraction,
+        mapped=cameras.mapped,
+        nodes=3 * robot.n_modules,
+        arm_timeout=rules.arm_timeout_s,
+    )
+    return RigPlant(cameras, drives, limits, period, session)
+
+
+def _check_period(rules: SafetyRules, period: float) -> None:
+    """A tick must come often enough to notice in time that the cameras have stopped."""
+    if 1e3 * period > rules.stale_stop_ms:
+        raise InputError(
+            f"controller.period_s {period:g} s is longer than safety.stale_stop_ms of the rig, "
+            f"{rules.stale_stop_ms:g} ms"
+        )

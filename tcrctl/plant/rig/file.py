@@ -1,0 +1,106 @@
+"""Rig files: found, read, and held against the robot that is to hang there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tcrctl.config import shipped, strict_yaml
+from tcrctl.config.strict_yaml import Document, Keys
+from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.plant.rig.settings import MountedRobot, RigFile
+from tcrctl.robot.description import RobotDescription, cable_routes
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedRig:
+    """A bench and one of the robots on it.
+
+    Attributes:
+        rig: The bench.
+        robot: Name of the robot.
+        path: The rig file.
+        given: Its contents as they are on disk.
+    """
+
+    rig: RigFile
+    robot: str
+    path: Path
+    given: bytes
+
+    @property
+    def mounted(self) -> MountedRobot:
+        """What the file says about the robot."""
+        return self.rig.robots[self.robot]
+
+
+def read_rig(name_or_path: str, folder: Path | None = None) -> tuple[RigFile, Path, bytes, Document]:
+    """Read a rig file.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+        folder: Where a relative path starts.
+
+    Raises:
+        UnknownNameError: If there is no shipped rig of that name.
+        SpecError: If the file has problems; all are listed.
+        InputError: If there is no such file.
+    """
+    path = shipped.find_rig(name_or_path, folder)
+    given = strict_yaml.read(path)
+    document = strict_yaml.loads(given, str(path))
+    return strict_yaml.validate(document, RigFile), path, given, document
+
+
+def load_rig(name_or_path: str, robot: RobotDescription, folder: Path | None = None) -> LoadedRig:
+    """Read a rig file for a robot.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+        robot: The robot that hangs there.
+        folder: Where a relative path starts.
+
+    Raises:
+        SpecError: If the file has problems, or does not fit the robot.
+        InputError: If there is no such file, or the robot does not hang there.
+    """
+    rig, path, given, document = read_rig(name_or_path, folder)
+    if robot.name not in rig.robots:
+        there = ", ".join(rig.robots)
+        raise InputError(f"{path}: robot {robot.name} does not hang on rig {rig.name}; there hang: {there}")
+    problems = [
+        Problem(document.where(keys), ".".join(map(str, keys)), message)
+        for keys, message in _misfits(rig.robots[robot.name], robot)
+    ]
+    if problems:
+        raise SpecError(problems)
+    return LoadedRig(rig, robot.name, path, given)
+
+
+def _misfits(mounted: MountedRobot, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+    at: Keys = ("robots", robot.name)
+    names = [route.name for route in cable_routes(robot)]
+    low, high = robot.stroke_mm
+    for name in names:
+        if name not in mounted.cables:
+            yield (*at, "cables"), f"cable {name} of {robot.name} has no drive"
+    for name, drive in mounted.cables.items():
+        if name not in names:
+            yield (*at, "cables", name), f"{robot.name} has no cable {name}; it has {', '.join(names)}"
+        for key, value in (("min_mm", drive.min_mm), ("max_mm", drive.max_mm)):
+            if not low <= value <= high:
+                limit = f"stroke_mm of {robot.name}, {low:g} to {high:g}"
+                yield (*at, "cables", name, key), f"must be within {limit}, not {value:g}"
+    yield from _marker_misfits(mounted, robot.modules.count, (*at, "markers"))
+
+
+def _marker_misfits(mounted: MountedRobot, count: int, at: Keys) -> Iterator[tuple[Keys, str]]:
+    rings = mounted.markers.rings
+    for i, ring in enumerate(() if rings == "all" else rings):
+        if ring > count:
+            yield (*at, "rings", i), f"there is no ring {ring}; there are rings 1 to {count}"
+    for i, marker in enumerate(mounted.markers.nodes):
+        module, _, node = marker.node.partition(".")
+        if module == "base" or node == "apex" or int(module[1:]) > count:
+            yield (*at, "nodes", i, "node"), f"must be a ring node m1.n1 .. m{count}.n3, not {marker.node}"

@@ -1,0 +1,210 @@
+"""Cable drives behind a PLC as the rig plant wants them: axes of the register map on the cables of the robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcr_hardware.errors import HardwareError
+from tcr_hardware.modbus.bus import PlcBus
+from tcr_hardware.modbus.errors import (
+    ImplausibleAnswerError,
+    MapError,
+    PlcFrozenError,
+    PlcMismatchError,
+    RateError,
+)
+from tcr_hardware.modbus.registers import Control, Fault, Reject, Status, register_map
+from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
+from tcrctl.errors import DeviceError, InputError, UntrustworthyDeviceError
+from tcrctl.plant.rig.devices import DriveControl, DriveStatus
+from tcrctl.plant.rig.settings import CableDrive, ModbusTcp, MountedRobot, SafetyRules
+
+_WRONG_FILE: Final = (MapError, PlcMismatchError, RateError)
+_HOPELESS: Final = (ImplausibleAnswerError, PlcFrozenError)
+
+
+def address(mounted: MountedRobot) -> str:
+    """Return where the PLC is, for messages."""
+    plc = mounted.plc
+    return f"PLC at {plc.host}:{plc.port}" if isinstance(plc, ModbusTcp) else f"PLC at {plc.device}"
+
+
+def bus_settings(mounted: MountedRobot) -> BusSettings:
+    """Return the settings of a bus.
+
+    Raises:
+        InputError: If the register map of the rig file is impossible.
+    """
+    plc = mounted.plc
+    link = (
+        TcpLink(plc.host, plc.port)
+        if isinstance(plc, ModbusTcp)
+        else RtuLink(plc.device, plc.baud, plc.parity, plc.stop_bits)
+    )
+    try:
+        registers = register_map(changes=plc.map)
+    except MapError as error:
+        raise InputError(f"plc.map: {error}", hint=error.hint) from error
+    return BusSettings(
+        link,
+        unit=plc.unit,
+        timeout_s=plc.timeout_ms / 1e3,
+        retries=plc.retries,
+        exchange=plc.exchange,
+        word_order=plc.word_order,
+        byte_order=plc.byte_order,
+        map=registers,
+    )
+
+
+class ModbusDrives:
+    """The drives of one robot.
+
+    Attributes:
+        bus: The connection.
+    """
+
+    def __init__(self, mounted: MountedRobot, names: tuple[str, ...]) -> None:
+        """Connect and read what the PLC is; nothing is written.
+
+        Args:
+            mounted: Section of the rig file.
+            names: Cables in the order of the drives.
+
+        Raises:
+            DeviceError: If the PLC does not answer.
+            InputError: If it is not what the rig file says.
+        """
+        self._where, self._names = address(mounted), names
+        self._cables = [mounted.cables[name] for name in names]
+        self._axes = np.array([cable.axis - 1 for cable in self._cables])
+        self._signs = np.array([cable.sign for cable in self._cables], dtype=np.int64)
+        self._speed = math.ceil(1e3 * max(cable.speed_limit_mm_s for cable in self._cables) / 100.0) * 100
+        self._asks = isinstance(mounted.plc, ModbusTcp)
+        self.bus = PlcBus(bus_settings(mounted))
+        try:
+            self._call(self.bus.open)
+            most = self.bus.info.limits
+            if int(self._axes.max()) >= len(most.min_um):
+                raise InputError(f"{self._where} has {len(most.min_um)} axes; the rig file names more")
+            self._raw = list(self.bus.info.status.positions_um)
+        except BaseException:
+            self.bus.close()
+            raise
+        self._last: DriveStatus | None = None
+
+    def check(self, rules: SafetyRules, period: float) -> float:
+        """Hold the rig file against the PLC's own limits; return the share of the period that the line is busy.
+
+        Args:
+            rules: Safety section of the rig file.
+            period: Time between two exchanges [s].
+
+        Raises:
+            InputError: With everything that the PLC would not allow.
+        """
+        wrong = list(self._excesses(rules))
+        if wrong:
+            text = "; ".join(wrong)
+            raise InputError(f"the rig file allows more than the {self._where}: {text}")
+        return float(self._call(lambda: self.bus.check_period(period)))
+
+    def _excesses(self, rules: SafetyRules) -> Iterator[str]:
+        limits = self.bus.info.limits
+        for name, cable in zip(self._names, self._cables, strict=True):
+            low, high = _axis_range(cable)
+            least, most = limits.min_um[cable.axis - 1], limits.max_um[cable.axis - 1]
+            if low < least or high > most:
+                yield (
+                    f"cable {name}: {low / 1e3:g} to {high / 1e3:g} mm on axis {cable.axis}, "
+                    f"PLC {least / 1e3:g} to {most / 1e3:g} mm"
+                )
+        if self._speed > limits.vmax_um_s:
+            yield f"speed {self._speed / 1e3:g} mm/s, PLC {limits.vmax_um_s / 1e3:g} mm/s"
+        if 1e3 * rules.max_step_mm > limits.step_max_um:
+            yield f"max_step_mm {rules.max_step_mm:g} mm, PLC {limits.step_max_um / 1e3:g} mm"
+
+    def status(self) -> DriveStatus:
+        """Read the status; over a serial line, where that costs wire time, what the last exchange said."""
+        if self._last is not None and not self._asks:
+            return self._last
+        return self._translated(self._call(self.bus.read_status))
+
+    def exchange(self, target: NDArray[np.int64], control: DriveControl) -> DriveStatus:
+        """Send one block and get the status; axes without a cable stay where the PLC says they are."""
+        block = list(self._raw)
+        for axis, value in zip(self._axes, self._signs * target, strict=True):
+            block[axis] = int(value)
+        bits = _bits(control)
+        answer = self._call(lambda: self.bus.exchange(block, bits, self._speed))
+        self._last = self._translated(answer)
+        return self._last
+
+    def close(self) -> None:
+        """End the connection."""
+        self.bus.close()
+
+    def _call(self, action: Callable[[], Any]) -> Any:
+        try:
+            return action()
+        except _WRONG_FILE as error:
+            raise InputError(f"{self._where}: {error}", hint=error.hint) from error
+        except _HOPELESS as error:
+            raise UntrustworthyDeviceError(f"{self._where}: {error}", hint=error.hint) from error
+        except HardwareError as error:
+            raise DeviceError(f"{self._where}: {error}", hint=error.hint) from error
+
+    def _translated(self, answer: Any) -> DriveStatus:
+        self._raw = list(answer.positions_um)
+        bits, refused = answer.status, answer.reject is not Reject.NONE
+        return DriveStatus(
+            position=self._signs * np.array(answer.positions_um, dtype=np.int64)[self._axes],
+            enabled=Status.ENABLED in bits,
+            zeroed=Status.ZEROED in bits,
+            stopping=Status.STOPPING in bits,
+            estop=Status.ESTOP in bits,
+            watchdog=Status.WATCHDOG in bits,
+            fault=_fault(answer.fault) if Status.FAULT in bits else "",
+            following_error=Status.FOLLOWING_ERROR in bits,
+            remote=Status.REMOTE in bits,
+            reject=self._reason(answer) if refused else "",
+            acknowledged=answer.ack_lag <= 1,
+            slack=Status.SLACK in bits,
+            round_trip=answer.round_trip_s,
+        )
+
+    def _reason(self, answer: Any) -> str:
+        text = answer.reject.name.lower().replace("_", " ")
+        axes = {cable.axis: name for name, cable in zip(self._names, self._cables, strict=True)}
+        return f"{text}, cable {axes.get(answer.reject_axis, f'of axis {answer.reject_axis}')}"
+
+
+def _axis_range(cable: CableDrive) -> tuple[int, int]:
+    """Soft limits as the axis counts them [um]."""
+    ends = (round(1e3 * cable.sign * cable.min_mm), round(1e3 * cable.sign * cable.max_mm))
+    return min(ends), max(ends)
+
+
+def _bits(control: DriveControl) -> Control:
+    bits = Control(0)
+    for wanted, bit in (
+        (control.enable, Control.ENABLE),
+        (control.follow, Control.FOLLOW),
+        (control.permit, Control.RUN),
+        (control.reset, Control.RESET),
+        (control.zero, Control.ZERO),
+    ):
+        bits |= bit if wanted else Control(0)
+    return bits
+
+
+def _fault(code: int) -> str:
+    try:
+        return Fault(code).name.lower().replace("_", " ")
+    except ValueError:
+        return f"code {code}"

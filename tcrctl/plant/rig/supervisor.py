@@ -1,0 +1,277 @@
+"""Safety supervisor of a rig: the one state machine that decides whether the drives may move.
+
+        operator's zeroing            operator agrees; zeroed, fresh measurement, echo
+    ZEROING <------------> DISARMED ------------------------------------------------> ARMED
+       |                    ^  ^                                                       |
+       |  operator's reset  |  | standstill                              first command |
+       |                    |  |                                                       v
+       |                    |  STOPPING <--stop asked, cameras or drives lost,---- RUNNING
+       |                    |     |        drive lags, set-points refused            ^   |
+       |                    |     | no standstill in time                   all well |   | doubt: stale, one
+       |                    |     v                                                  |   v lost answer
+       +------fault------> FAULTED <--e-stop, watchdog, PLC fault--- any of those -- HOLDING
+
+What the states tell the drives:
+
+    state     enable  follow  permit    set-points
+    DISARMED                            none
+    ZEROING                     x       present positions, tension-zero edge
+    ARMED       x               x       present positions
+    RUNNING     x       x       x       the controller's, inside all limits
+    HOLDING     x       x       x       the last ones again, so that the watchdog is fed
+    STOPPING    x                       none: the PLC ramps down and then holds
+    FAULTED                             none; latched until an operator resets it
+
+Rules: no motion is resumed after STOPPING or FAULTED without arming again; every transition is reported with its
+cause. This is not a safety function: the emergency stop is hard-wired, and if this program dies the watchdog
+in the PLC stops the drives. See docs/bench.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Final
+
+from tcrctl.errors import ArmingRefusedError, DeviceError, RigStopError, TcrctlError
+from tcrctl.plant.rig.devices import DriveControl, DriveStatus
+from tcrctl.plant.rig.sight import Rules, Sight
+
+Report = Callable[[str, str, str], None]
+"""Takes kind, level and text of an event."""
+
+RESET_HINT: Final = "When the cause is removed: tcrctl rig reset"
+
+
+class State(StrEnum):
+    """States of the supervisor, see the module's docstring."""
+
+    DISARMED = "disarmed"
+    ZEROING = "zeroing"
+    ARMED = "armed"
+    RUNNING = "running"
+    HOLDING = "holding"
+    STOPPING = "stopping"
+    FAULTED = "faulted"
+
+
+_NEXT: Final = {
+    State.DISARMED: {State.ZEROING, State.ARMED, State.FAULTED},
+    State.ZEROING: {State.DISARMED, State.FAULTED},
+    State.ARMED: {State.RUNNING, State.STOPPING, State.FAULTED},
+    State.RUNNING: {State.HOLDING, State.STOPPING, State.FAULTED},
+    State.HOLDING: {State.RUNNING, State.STOPPING, State.FAULTED},
+    State.STOPPING: {State.DISARMED, State.FAULTED},
+    State.FAULTED: {State.DISARMED},
+}
+_CONTROL: Final = {
+    State.DISARMED: DriveControl(),
+    State.ZEROING: DriveControl(permit=True),
+    State.ARMED: DriveControl(enable=True, permit=True),
+    State.RUNNING: DriveControl(enable=True, follow=True, permit=True),
+    State.HOLDING: DriveControl(enable=True, follow=True, permit=True),
+    State.STOPPING: DriveControl(enable=True),
+    State.FAULTED: DriveControl(),
+}
+_MOVING: Final = (State.ARMED, State.RUNNING, State.HOLDING)
+
+
+class Supervisor:
+    """See the module's docstring.
+
+    Attributes:
+        state: The state now.
+        failure: Why the run has to end; None while it need not.
+    """
+
+    def __init__(self, rules: Rules, report: Report) -> None:
+        """Begin disarmed; ``report`` takes every transition with its cause."""
+        self.state, self.failure = State.DISARMED, None
+        self._rules, self._report = rules, report
+        self._stopping_since = 0.0
+
+    failure: TcrctlError | None
+
+    @property
+    def control(self) -> DriveControl:
+        """What the drives are told in this state."""
+        return _CONTROL[self.state]
+
+    @property
+    def armed(self) -> bool:
+        """Whether the drives are on because of this program."""
+        return self.state in (*_MOVING, State.ZEROING, State.STOPPING)
+
+    def check_ready(self, sight: Sight, *, confirmed: bool) -> None:
+        """Find out whether the drives may be armed.
+
+        Args:
+            sight: What is known now.
+            confirmed: The operator has agreed.
+
+        Raises:
+            ArmingRefusedError: With every condition that is not met.
+        """
+        reasons = list(_refusals(sight, self._rules))
+        if not confirmed:
+            reasons.append("the operator has not agreed (--yes)")
+        if self.state is not State.DISARMED:
+            reasons.append(f"the supervisor is {self.state}")
+        if reasons:
+            latched = sight.status is not None and (sight.status.fault or sight.status.watchdog)
+            raise ArmingRefusedError(reasons, hint=RESET_HINT if latched else "")
+
+    def arm(self, cause: str) -> None:
+        """The drives are on and echo what they are sent."""
+        self._go(State.ARMED, "info", cause)
+
+    def begin_zeroing(self) -> None:
+        """Let the drives be zeroed."""
+        self._go(State.ZEROING, "info", "tension-zero asked for")
+
+    def end_zeroing(self, cause: str) -> None:
+        """Zeroing is over."""
+        self._go(State.DISARMED, "info", cause)
+
+    def run(self) -> None:
+        """The first command of the controller is about to be sent."""
+        if self.state is State.ARMED:
+            self._go(State.RUNNING, "info", "first command")
+
+    def watch(self, now: float, sight: Sight) -> State:
+        """Look at a cycle and return the state from now on; ``failure`` says why the run must end if it must.
+
+        Args:
+            now: Time of a clock that never jumps [s].
+            sight: What is known.
+        """
+        if self.state not in _MOVING:
+            return self.state
+        doubt = _doubt(sight, self._rules)
+        if fault := _fault(sight.status):
+            self._end(now, State.FAULTED, RigStopError(fault, hint=RESET_HINT))
+        elif failure := self._reason_to_stop(sight):
+            self._end(now, State.STOPPING, failure)
+        elif doubt and self.state is State.RUNNING:
+            self._go(State.HOLDING, "warning", doubt)
+        elif not doubt and self.state is State.HOLDING:
+            self._go(State.RUNNING, "info", "cameras and drives are well again")
+        return self.state
+
+    def stop(self, now: float, cause: str) -> None:
+        """Bring the drives to a controlled stop; nothing happens if they are not armed or stop already."""
+        if self.state in _MOVING:
+            self._stopping_since = now
+            self._go(State.STOPPING, "info", cause)
+
+    def rest(self, now: float, sight: Sight, *, moved: bool) -> State:
+        """Follow a controlled stop to its end.
+
+        Args:
+            now: Time [s].
+            sight: What is known; the cameras do not matter any more.
+            moved: Whether a drive has moved since the cycle before.
+        """
+        if self.state is not State.STOPPING:
+            return self.state
+        status = None if sight.silence > 0.0 else sight.status
+        waited = now - self._stopping_since
+        if fault := _fault(status, enabled=False):
+            self._end(now, State.FAULTED, RigStopError(fault, hint=RESET_HINT))
+        elif status is not None and not (status.stopping or status.enabled or moved):
+            self._go(State.DISARMED, "info", f"standstill after {waited:.2f} s")
+        elif waited > self._rules.standstill:
+            why = sight.trouble if status is None else "the drives are still moving"
+            text = (
+                f"no standstill within {waited:.2f} s ({why}); the watchdog of the PLC has to stop the drives"
+            )
+            self._end(now, State.FAULTED, DeviceError(text, hint=RESET_HINT))
+        return self.state
+
+    def reset(self) -> None:
+        """An operator has removed the cause of a fault."""
+        if self.state is State.FAULTED:
+            self.failure = None
+            self._go(State.DISARMED, "info", "reset by the operator")
+
+    def _reason_to_stop(self, sight: Sight) -> TcrctlError | None:
+        rules, status = self._rules, sight.status
+        if sight.hopeless or sight.silence >= rules.silence:
+            return DeviceError(
+                f"safety stop of the rig: the drives have not answered for {1e3 * sight.silence:.0f} ms: "
+                f"{sight.trouble}"
+            )
+        if sight.age >= rules.stale_stop:
+            return RigStopError(
+                f"no usable measurement for {1e3 * sight.age:.0f} ms, limit {1e3 * rules.stale_stop:.0f} ms"
+            )
+        if sight.following > rules.following or (status is not None and status.following_error):
+            return RigStopError(
+                f"cable {sight.laggard} is {sight.following / 1e3:.2f} mm from its set-point, "
+                f"limit {rules.following / 1e3:.2f} mm"
+            )
+        if sight.refused >= rules.rejects and status is not None:
+            return RigStopError(f"the PLC refused {sight.refused} set-points in a row: {_refusal(status)}")
+        return None
+
+    def _end(self, now: float, state: State, failure: TcrctlError) -> None:
+        self.failure = self.failure or failure
+        self._stopping_since = now
+        self._go(state, "error", str(failure))
+
+    def _go(self, state: State, level: str, cause: str) -> None:
+        if state not in _NEXT[self.state]:
+            raise RuntimeError(f"the supervisor cannot go from {self.state} to {state}: {cause}")
+        before, self.state = self.state, state
+        self._report("supervisor", level, f"{before} -> {state}: {cause}")
+
+
+def _fault(status: DriveStatus | None, *, enabled: bool = True) -> str:
+    """What the drives report that ends a run at once and is latched; empty if all is well."""
+    if status is None:
+        return ""
+    if status.estop:
+        return "the emergency stop is pressed"
+    if status.watchdog:
+        return "the watchdog of the PLC has tripped: it was not written to in time"
+    if status.fault:
+        return f"the PLC reports a fault: {status.fault}"
+    if enabled and not status.enabled:
+        return "the PLC has switched the drives off"
+    return ""
+
+
+def _doubt(sight: Sight, rules: Rules) -> str:
+    """Why the drives shall be held for now; empty if all is well."""
+    if sight.trouble:
+        return f"no answer of the drives: {sight.trouble}"
+    if sight.age >= rules.stale:
+        return f"no usable measurement for {1e3 * sight.age:.0f} ms"
+    if sight.refused and sight.status is not None:
+        return f"the PLC refused a set-point: {_refusal(sight.status)}"
+    return ""
+
+
+def _refusal(status: DriveStatus) -> str:
+    return status.reject or "it was not acknowledged"
+
+
+def _refusals(sight: Sight, rules: Rules) -> list[str]:
+    """Everything that stands against arming."""
+    status, reasons = sight.status, []
+    if status is None or sight.trouble:
+        return [f"the drives do not answer {sight.trouble}".strip()]
+    if fault := _fault(status, enabled=False):
+        reasons.append(fault)
+    if not status.zeroed:
+        reasons.append("tension-zero is not known (tcrctl rig zero)")
+    if not status.remote:
+        reasons.append("the PLC is not switched to remote")
+    if not status.acknowledged:
+        reasons.append("the PLC does not acknowledge")
+    if sight.age == math.inf:
+        reasons.append("the cameras have shown no usable measurement")
+    elif not sight.age < rules.stale:
+        reasons.append(f"the newest usable measurement is {1e3 * sight.age:.0f} ms old")
+    return reasons

@@ -1,1 +1,0 @@
-"""Work on a rig beside experiments: check, status, calibrate, zero, jog, reset; one verb one file."""
