@@ -13,8 +13,7 @@ from pathlib import Path
 os.environ.setdefault("NUMBA_OPT", "1")
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from fault_matrix import STRICT, all_cells, bound, play, violations
-
+from support.fault_matrix import STRICT, all_cells, bound, play, violations
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.robot import build_robot
 

@@ -20,8 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-import records
-
+from support import records
 from tcrctl.experiment.spec import LogSettings
 from tcrctl.log.viewer_topics import ViewerTopics
 from tcrctl.log.writer import LogWriter

@@ -21,9 +21,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-import records
-from viewer_client import ViewerClient
-
+from support import records
+from support.viewer_client import ViewerClient
 from tcrctl.log.viewer_topics import TOPICS
 from tcrctl.log.writer import LogWriter
 from tcrctl.view.live import LiveView

@@ -1,0 +1,179 @@
+"""The linearised response against the nonlinear robot, its own static limit and its order in time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from support import mechanics
+from support.mechanics import FREE
+from tcrctl.robot import dynamics, linear, pose, response
+from tcrctl.robot.equations import assemble, make_workspace
+from tcrctl.robot.equilibrium import equilibrium, static_load
+from tcrctl.robot.modes import modes
+
+ROBOTS = ["tcr600", "tcr700"]
+MODES = 16
+
+
+@pytest.fixture(params=ROBOTS)
+def robot(request):
+    return request.getfixturevalue(request.param)
+
+
+class Bent:
+    """A robot at a bent, taut equilibrium, with the basis of its response."""
+
+    def __init__(self, robot, basis_modes=MODES, model=None):
+        self.robot = robot
+        self.model = robot.model if model is None else model
+        self.drive = 0.012 + 0.004 * np.cos(np.arange(robot.n_cables))
+        self.rest = equilibrium(self.model, self.drive, robot.weight, robot.rest.q)
+        assert (self.rest.tension > 1.0).all()
+        self.basis = response.start_basis(self.model, self.workspace(), basis_modes)
+
+    def workspace(self):
+        ws = make_workspace(self.model)
+        load = static_load(self.model, self.robot.weight)
+        assemble(self.model, self.rest.q, self.drive, load, ws, np.bool_(True))
+        assert linear.factor_shifted(ws.K, ws.U) == 0.0
+        return ws
+
+    def respond(self, offset, v, step, steps):
+        change, stable = response.respond(
+            self.model,
+            self.rest.q,
+            offset,
+            v,
+            step,
+            steps,
+            self.robot.tip,
+            self.workspace(),
+            self.basis.copy(),
+        )
+        assert stable
+        return change
+
+    def outputs(self, q, tension):
+        tip = self.robot.tip
+        return np.concatenate([pose.position(q, tip), pose.normal(q, tip), [pose.twist(q, tip)], tension])
+
+    def simulate(self, v, speed, step, steps):
+        """Changes of the outputs in the nonlinear simulation (steps, 7 + m)."""
+        x = dynamics.rest_state(self.rest.q, self.drive)
+        x.v[:] = v
+        work, scratch = make_workspace(self.model), dynamics.make_scratch(self.model)
+        before, out = self.outputs(self.rest.q, self.rest.tension), []
+        for _ in range(steps):
+            assert dynamics.advance(self.model, x, speed, step, 5e-4, 0.8, self.robot.weight, work, scratch)[
+                0
+            ]
+            out.append(self.outputs(x.q, work.tension) - before)
+        return np.array(out)
+
+
+def slow_velocity(bent, size):
+    """Velocity in the two slowest modes, ``size`` [m/s] at its fastest node."""
+    found = modes(bent.model, bent.rest, bent.drive, bent.robot.weight, 2)
+    v = found.shape @ [1.0, 0.5]
+    return size * np.concatenate([np.zeros(FREE), v / np.abs(v).max()])
+
+
+def without_dampers(robot):
+    """Mass-proportional damping alone, which is what the response knows of damping."""
+    return mechanics.undamped(robot.model)._replace(damping=robot.model.damping)
+
+
+def test_small_motions_are_those_of_the_nonlinear_robot_up_to_second_order(robot):
+    bent = Bent(robot, basis_modes=40, model=without_dampers(robot))
+    u = 0.02 * np.cos(1.0 + np.arange(robot.n_cables))
+    v, still = slow_velocity(bent, 0.05), np.zeros_like(bent.rest.q)
+    change = bent.respond(still, v, 0.01, 30)
+    linear_motion = change[:, :, :-1] @ u + change[:, :, -1]
+    errors = []
+    for part in (0.25, 0.125):
+        motion = bent.simulate(part * v, part * u, 0.01, 30)
+        difference = np.abs(motion - part * linear_motion)[:, :3].max()
+        errors.append([difference, np.abs(motion)[:, :3].max()])
+    (large, moved), (small, _) = errors
+    assert moved > 1e-3
+    assert large < 0.06 * moved
+    assert small < 0.3 * large
+
+
+def test_the_end_position_is_forecast_within_two_per_cent(robot):
+    """With the shipped basis and all dampers of the plant."""
+    bent = Bent(robot)
+    u, v = 0.001 * np.cos(1.0 + np.arange(robot.n_cables)), slow_velocity(bent, 0.005)
+    change = bent.respond(np.zeros_like(v), v, 0.025, 32)
+    forecast = change[:, :, :-1] @ u + change[:, :, -1]
+    motion = bent.simulate(v, u, 0.025, 32)
+    assert np.abs(forecast - motion)[:, :3].max() < 0.02 * np.abs(motion)[:, :3].max()
+    assert np.abs(forecast - motion)[:, 3:6].max() < 0.03 * np.abs(motion)[:, 3:6].max()
+
+
+def test_after_a_slow_ramp_the_change_is_the_static_gain(robot):
+    """A ramp of 1 m/s after t seconds: gain times (t - lag), so differences of late times are the gain."""
+    bent = Bent(robot, model=without_dampers(robot)._replace(damping=20.0))
+    change = bent.respond(np.zeros_like(bent.rest.q), np.zeros_like(bent.rest.q), 0.1, 400)
+    slope = (change[-1] - change[-101]) / 10.0
+    first = 3 * (robot.tip - 4)
+    C = pose.output_matrix(bent.rest.q, robot.tip)
+    expected = C @ bent.rest.gain[first : first + 9]
+    np.testing.assert_allclose(slope[:7, :-1], expected, atol=1e-4 * np.abs(expected).max())
+    ws = bent.workspace()
+    linear.couple(ws, ws.r)
+    tensions = linear.tension_gain(ws, bent.rest.gain)
+    np.testing.assert_allclose(slope[7:, :-1], tensions, atol=1e-3 * np.abs(tensions).max())
+
+
+def test_free_motion_dies_out_towards_the_point_of_rest(robot):
+    bent = Bent(robot, model=without_dampers(robot)._replace(damping=20.0))
+    offset = slow_velocity(bent, 0.01)
+    change = bent.respond(offset, np.zeros_like(offset), 0.1, 400)
+    first = 3 * robot.tip
+    expected = -pose.output_matrix(bent.rest.q, robot.tip) @ offset[first : first + 9]
+    np.testing.assert_allclose(change[-1, :7, -1], expected, atol=1e-6)
+
+
+def test_responses_converge_with_the_square_of_the_step(robot):
+    bent = Bent(robot)
+    v = slow_velocity(bent, 0.05)
+    ends = [bent.respond(np.zeros_like(v), v, 0.4 / n, n)[-1, :6] for n in (16, 32, 64, 512)]
+    free = [np.abs(end[:, -1] - ends[-1][:, -1]).max() for end in ends[:-1]]
+    order = np.log2(np.divide(free[:-1], free[1:]))
+    assert np.all((order > 1.8) & (order < 2.2)), order
+
+
+def test_the_response_is_linear_in_the_state(robot):
+    bent = Bent(robot)
+    a, b = slow_velocity(bent, 0.01), np.roll(slow_velocity(bent, 0.02), 3)
+    b[:FREE] = 0.0
+    still = np.zeros_like(a)
+    both = bent.respond(a, b, 0.02, 10)
+    apart = bent.respond(a, still, 0.02, 10)[:, :, -1] + bent.respond(still, b, 0.02, 10)[:, :, -1]
+    np.testing.assert_allclose(both[:, :, -1], apart, atol=1e-9 * np.abs(apart).max())
+
+
+def test_the_basis_holds_the_slowest_modes_and_the_static_answers(robot):
+    bent = Bent(robot)
+    found = modes(bent.model, bent.rest, bent.drive, robot.weight, 4)
+    M_V = np.stack([mechanics.mass_times(bent.model, np.r_[np.zeros(FREE), x]) for x in bent.basis.T], axis=1)
+    gram = bent.basis.T @ M_V
+    kept = np.diag(gram) > 0.5
+    np.testing.assert_allclose(gram[np.ix_(kept, kept)], np.eye(kept.sum()), atol=1e-9)
+    for shape in (*found.shape.T, *bent.rest.gain.T):
+        outside = shape - bent.basis @ (M_V.T @ shape)
+        assert np.linalg.norm(outside) < 1e-5 * np.linalg.norm(shape)
+
+
+def test_a_slack_cable_keeps_its_authority_over_its_predicted_tension(tcr700):
+    bent = Bent(tcr700)
+    ws = bent.workspace()
+    ws.axial[1] = 0.0  # as if cable 2 were slack
+    still = np.zeros_like(bent.rest.q)
+    change, stable = response.respond(
+        bent.model, bent.rest.q, still, still, 0.02, 5, tcr700.tip, ws, bent.basis.copy()
+    )
+    assert stable
+    assert change[-1, 7 + 1, 1] > 0.0

@@ -1,0 +1,89 @@
+"""Controllers of every kind, targets for them, and a loop that closes one round a simulated plant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcrctl.controller.controller import build_controller
+from tcrctl.controller.settings import CostWeights, IocSettings, KinematicSettings
+from tcrctl.estimator.estimator import build_estimator
+from tcrctl.estimator.settings import PassiveObserverSettings
+from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plant.simulated import SimulatedPlant
+from tcrctl.signals import Command, Estimate, Reference
+
+#: Keys of ``controller:`` for every way to predict.
+PREDICTIONS = {
+    "multi_step": {"prediction": "multi_step", "horizon_s": 0.8},
+    "one_step": {"prediction": "one_step", "horizon_s": 0.4},
+    "literal": {"prediction": "literal", "horizon_s": 0.05},
+    "static": {"prediction": "multi_step", "horizon_s": 0.8, "model": "static"},
+    "static literal": {"prediction": "literal", "horizon_s": 0.05, "model": "static"},
+}
+
+
+KINDS = [*PREDICTIONS, "kinematic"]
+
+
+def settings_of(kind, **changes):
+    return KinematicSettings(kind="kinematic", **changes) if kind == "kinematic" else ioc(kind, **changes)
+
+
+def ioc(prediction="multi_step", **changes) -> IocSettings:
+    return IocSettings(kind="ioc", **{**PREDICTIONS[prediction], **changes})
+
+
+def pose_settings(**changes) -> IocSettings:
+    return ioc(output="pose", weights=CostWeights(position=7.2e4, normal=44.0, twist=1e-3), **changes)
+
+
+def resting(robot, drive=None) -> Estimate:
+    """The state at rest."""
+    q = robot.rest.q
+    return Estimate(
+        t=0.0,
+        q=q.copy(),
+        v=np.zeros_like(q),
+        drive=np.zeros(robot.n_cables) if drive is None else drive,
+        tension=robot.rest.tension.copy(),
+        position=robot.rest_position,
+        normal=robot.rest_normal,
+        disturbance=np.zeros_like(q),
+        converged=True,
+    )
+
+
+def constant(robot, controller, offset=(0.0, 0.0, 0.0), t=0.0) -> Reference:
+    """A target that stands still beside the rest pose."""
+    n = controller.ahead.shape[0]
+    target = robot.rest_position + np.array(offset)
+    return Reference(
+        t, target, robot.rest_normal, np.tile(target, (n, 1)), np.tile(robot.rest_normal, (n, 1))
+    )
+
+
+def closed_loop(robot, settings, offset, seconds, mismatch=None, noise=0.0, latency=0.0):
+    """Errors (n,) [m], commands (n, m) and infos of a controller that is asked to go to one target."""
+    plant = SimulatedPlant(
+        SimulatedSettings(
+            kind="simulated", step_ms=2.5, mismatch=mismatch, noise_um=noise, latency_ms=latency
+        ),
+        robot,
+        settings.period_s,
+        seed=3,
+    )
+    observer = build_estimator(
+        PassiveObserverSettings(kind="passive_observer"), robot, settings.period_s, None
+    )
+    controller = build_controller(settings, robot)
+    applied = Command(np.zeros(robot.n_cables), np.zeros(robot.n_cables))
+    errors, speeds, infos = [], [], []
+    for k in range(round(seconds / settings.period_s)):
+        estimate = observer.update(plant.read(), applied)
+        reference = constant(robot, controller, offset, k * settings.period_s)
+        errors.append(np.linalg.norm(plant.truth().position - reference.position))
+        wanted, info = controller.control(estimate, reference)
+        applied = plant.write(wanted)
+        speeds.append(wanted.speed)
+        infos.append(info)
+    return np.array(errors), np.array(speeds), infos
