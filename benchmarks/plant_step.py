@@ -24,7 +24,7 @@ from tcrctl.numerics import block_banded
 from tcrctl.robot import dynamics, linear
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.equations import FORCE, Load, assemble, make_workspace
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.signals import Array
 

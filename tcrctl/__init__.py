@@ -27,7 +27,8 @@ name              meaning                                                     sh
 World frame: right-handed, z up, origin in the centre of the base ring; the robot hangs towards -z.
 Nodes: module 0 is the fixed base; module i (1 .. n_modules) hangs below module i-1. Every module has
 four nodes, ``n1 n2 n3`` on its ring (counter-clockwise seen from +z) and ``apex``, so that node j of
-module i is row ``4 i + j``. In files a node is written ``base.n1``, ``m7.apex``.
+module i is row ``4 i + j``. In files a node is written ``base.n1``, ``m7.apex``. What
+follows from that kind of module is in :mod:`tcrctl.robot.module` and nowhere else.
 Equation numbers refer to the paper, key [TCR] in REFERENCES.md.
 """
 

@@ -19,8 +19,8 @@ from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError, TcrctlError
 from tcrctl.experiment.provenance import ROBOT
 from tcrctl.experiment.run_folder import RESOLVED, log_in
-from tcrctl.log.geometry import NODES_PER_MODULE
 from tcrctl.log.reader import Log, read_log
+from tcrctl.robot.module import SIZE
 from tcrctl.signals import Array
 
 _COLUMNS: Final = (
@@ -232,7 +232,7 @@ def _history(log: Log, label: str, begin: float | None, end: float | None) -> Hi
 
 def _shapes(q: NDArray[Any]) -> tuple[NDArray[np.int64], Array]:
     """Steps with a whole shape, and the shapes; a log need not have one at every step."""
-    if not q.shape[1] or q.shape[1] % (3 * NODES_PER_MODULE):
+    if not q.shape[1] or q.shape[1] % SIZE:
         return np.zeros(0, np.int64), np.zeros((0, 0, 3))
     known = np.flatnonzero(np.isfinite(q).all(axis=1))
     return known, q[known].reshape(len(known), -1, 3).astype(np.float64)

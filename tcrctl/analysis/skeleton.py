@@ -11,10 +11,10 @@ from tcrctl.config import strict_yaml
 from tcrctl.elements.torus import point_weights
 from tcrctl.errors import TcrctlError
 from tcrctl.experiment.provenance import ROBOT
-from tcrctl.log.geometry import NODES_PER_MODULE, CableRoute
+from tcrctl.log.geometry import CableRoute
 from tcrctl.log.reader import Log
 from tcrctl.robot.description import RobotDescription, cable_routes, spring_list
-from tcrctl.robot.model import node_index
+from tcrctl.robot.module import node_count, node_index, ring_nodes
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def read_skeleton(log: Log, n_nodes: int) -> Skeleton | None:
         robot = strict_yaml.validate(strict_yaml.loads(text, ROBOT), RobotDescription)
     except TcrctlError:
         return None
-    if NODES_PER_MODULE * (robot.modules.count + 1) != n_nodes:
+    if node_count(robot.modules.count) != n_nodes:
         return None
     springs = spring_list(robot)
     ends = [[node_index(name) for name in spring.nodes] for spring in springs]
@@ -60,7 +60,7 @@ def read_skeleton(log: Log, n_nodes: int) -> Skeleton | None:
         cables=tuple(
             CableRoute(
                 name=route.name,
-                nodes=np.array([[NODES_PER_MODULE * ring + k for k in range(3)] for ring, _ in route.holes]),
+                nodes=np.array([ring_nodes(ring) for ring, _ in route.holes]),
                 weights=np.array([point_weights(angle) for _, angle in route.holes]),
             )
             for route in cable_routes(robot)

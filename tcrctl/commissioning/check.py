@@ -15,7 +15,7 @@ from tcrctl.plant.rig.devices import DriveStatus, Sighting
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.modbus_drives import ModbusDrives
 from tcrctl.plant.rig.natnet_cameras import NatNetCameras
-from tcrctl.robot.model import ring_rows
+from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot
 
 #: How long the cameras are watched [s].

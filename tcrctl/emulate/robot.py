@@ -12,7 +12,7 @@ from tcrctl.errors import DivergenceError
 from tcrctl.plant.settings import Mismatch
 from tcrctl.robot import dynamics
 from tcrctl.robot.equations import make_workspace
-from tcrctl.robot.model import ring_rows
+from tcrctl.robot.module import ring_nodes, ring_rows
 from tcrctl.robot.robot import Robot, mismatched
 from tcrctl.signals import Array
 
@@ -62,7 +62,7 @@ class EmulatedRobot:
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._work.tension[:] = robot.rest.tension
         self._time = clock()
-        self._rings = np.array([0, 1, 2, *ring_rows(robot.n_modules)])
+        self._rings = np.array([*ring_nodes(0), *ring_rows(robot.n_modules)])
 
     def rings(self) -> Array:
         """All ring nodes now, those of the base first (3 + 3 n_modules, 3) [m].

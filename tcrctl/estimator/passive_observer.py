@@ -22,7 +22,7 @@ from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.memory import NORMAL, POSITION, SPEED, Kept
 from tcrctl.robot import dynamics, pose
 from tcrctl.robot.equations import FORCE, Q_FREE, SPRING, SPRING_AT, Load, make_workspace
-from tcrctl.robot.model import FIXED, ring_rows
+from tcrctl.robot.module import FIXED, ring_rows
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, Estimate, Measurement

@@ -19,7 +19,7 @@ from tcrctl.elements import sliding_cable
 from tcrctl.errors import InfeasibleError, NoEquilibriumError
 from tcrctl.robot import pose
 from tcrctl.robot.equilibrium import Equilibrium, equilibrium
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
 from tcrctl.trajectory.trajectory import Trajectory, drives_of

@@ -27,7 +27,7 @@ from tcrctl.plant.rig.session import Session
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.signals import Array, StepRecord
 from tcrctl.task.task import Task, build_task, task_targets
@@ -229,7 +229,7 @@ def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple
         robot: Says which nodes are the tip ring.
         reads: How many measurements are averaged.
     """
-    tip = 3 * (robot.tip // FIXED - 1)  # rings are measured from the first free one on
+    tip = ring_rows(robot.n_modules).index(robot.tip)
     seen = [plant.read() for _ in range(reads)]
     rings = [m.nodes[tip : tip + 3].astype(float) for m in seen if m.valid[tip : tip + 3].all()]
     if not rings:

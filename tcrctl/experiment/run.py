@@ -39,7 +39,7 @@ from tcrctl.loop.pacing import Pace, RealTime, Unpaced
 from tcrctl.loop.quiet import quiet_interpreter
 from tcrctl.plant.rig.journal import Journal
 from tcrctl.plant.rig.session import Session
-from tcrctl.robot.model import FIXED, RIGID_BARS, ring_rows
+from tcrctl.robot.module import RIGID_BARS, module_of, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import StepRecord
 from tcrctl.trajectory.trajectory import Trajectory
@@ -145,7 +145,7 @@ def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeome
         robot.n_modules,
         tuple(routes),
         tuple(ring_rows(robot.n_modules)),
-        robot.tip // FIXED,
+        module_of(robot.tip),
         springs=model.bar_nodes[RIGID_BARS * robot.n_modules :],
         reference_path=np.zeros((0, 3)) if trajectory is None else trajectory.position(points),
     )

@@ -13,6 +13,7 @@ from tcrctl.identify.loading import LogSource
 from tcrctl.identify.points import node_rows
 from tcrctl.log.reader import Log, read_log
 from tcrctl.robot.description import RobotDescription, cable_routes
+from tcrctl.robot.module import module_count
 from tcrctl.robot.robot import build_robot
 from tcrctl.signals import Array
 
@@ -85,7 +86,7 @@ def read_recording(source: LogSource, robot: RobotDescription) -> Recording:
 
 def _check_robot(log: Log, robot: RobotDescription) -> None:
     cables = tuple(route.name for route in cable_routes(robot))
-    modules = len(log.node_names) // 4 - 1
+    modules = module_count(len(log.node_names))
     ran = log.start.get("robot", "unknown")
     for what, found, wanted in (
         ("modules", modules, robot.modules.count),

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 
 from tcrctl.robot.description import RobotDescription
+from tcrctl.robot.module import LABELS, node_index, ring_nodes
 
-_NODE = re.compile(r"m([1-9][0-9]*)\.(n1|n2|n3|apex)")
+_NODE = re.compile(rf"m([1-9][0-9]*)\.({'|'.join(LABELS)})")
 _RING = re.compile(r"ring([1-9][0-9]*)")
-_ORDER = ("n1", "n2", "n3", "apex")
 
 
 def node_rows(name: str, robot: RobotDescription) -> tuple[int, int, int]:
@@ -24,11 +24,11 @@ def node_rows(name: str, robot: RobotDescription) -> tuple[int, int, int]:
     count = robot.modules.count
     node, ring = _NODE.fullmatch(name), _RING.fullmatch(name)
     if node and int(node[1]) <= count:
-        row = 4 * int(node[1]) + _ORDER.index(node[2])
+        row = node_index(name)
         return row, row, row
     number = robot.tip.ring if name == "end" else int(ring[1]) if ring else 0
     if 1 <= number <= count:
-        return 4 * number, 4 * number + 1, 4 * number + 2
+        return ring_nodes(number)
     raise ValueError(
         f"{robot.name} has no point {name!r}; it has nodes m1.n1, m1.n2, m1.n3, m1.apex to m{count}.apex, "
         f"ring centres ring1 to ring{count}, and end, the centre of the tip ring"

@@ -23,7 +23,8 @@ from tcrctl.robot import linear
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.equations import Load, Workspace, assemble, make_workspace, residual
 from tcrctl.robot.equilibrium import equilibrium, static_load, with_rest_lengths
-from tcrctl.robot.model import FIXED, Model, build_model, gravity_force, undeformed
+from tcrctl.robot.model import Model, build_model, gravity_force, undeformed
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
 

@@ -7,10 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.robot import module
 from tcrctl.signals import Array
-
-NODES_PER_MODULE = 4
-NODE_LABELS = ("n1", "n2", "n3", "apex")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +33,10 @@ class CableRoute:
 
 @dataclass(frozen=True, slots=True)
 class LogGeometry:
-    """Names and topology, in the node order of the notation table (:mod:`tcrctl`).
+    """Names and topology, in the node order of :mod:`tcrctl.robot.module`.
 
     Attributes:
-        n_modules: Modules below the fixed base; the robot has ``4 (n_modules + 1)`` nodes.
+        n_modules: Modules below the fixed base.
         cables: One route per cable, in the order of ``drive``.
         marker_nodes: Row of the node that each row of ``Measurement.nodes`` measures (n_markers,).
         tip_ring: Module whose ring is the end of eq. (11).
@@ -67,17 +65,17 @@ class LogGeometry:
     @property
     def n_nodes(self) -> int:
         """Number of nodes, base included."""
-        return NODES_PER_MODULE * (self.n_modules + 1)
+        return module.node_count(self.n_modules)
 
     @property
     def ring_names(self) -> tuple[str, ...]:
         """``base, m1, m2, ...``: names of the modules, also of the ring frames on ``/tf``."""
-        return ("base", *(f"m{i}" for i in range(1, self.n_modules + 1)))
+        return module.module_names(self.n_modules)
 
     @property
     def node_names(self) -> tuple[str, ...]:
         """``base.n1, base.n2, ..., m1.apex, ...`` in row order."""
-        return tuple(f"{ring}.{label}" for ring in self.ring_names for label in NODE_LABELS)
+        return module.node_names(self.n_modules)
 
     @property
     def marker_names(self) -> tuple[str, ...]:
@@ -93,6 +91,5 @@ class LogGeometry:
     @property
     def rods(self) -> NDArray[np.int64]:
         """Node rows of the rods from ring to apex (3 (n_modules + 1), 2)."""
-        first = NODES_PER_MODULE * np.arange(self.n_modules + 1)[:, None]
-        ends = np.stack([first + np.arange(3), np.broadcast_to(first + 3, (self.n_modules + 1, 3))], axis=-1)
-        return ends.reshape(-1, 2)
+        ends = [pair for i in range(self.n_modules + 1) for pair in module.rods(i)]
+        return np.array(ends, dtype=np.int64)

@@ -19,7 +19,8 @@ from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from tcrctl.log.geometry import NODES_PER_MODULE, CableRoute, LogGeometry
+from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.robot.module import rings
 from tcrctl.signals import Array
 
 WORLD: Final = "world"
@@ -82,8 +83,7 @@ class Scene:
             when: Time of the step.
         """
         update = SceneUpdate()
-        for i, name in enumerate(self._geometry.ring_names):
-            corners = nodes[NODES_PER_MODULE * i : NODES_PER_MODULE * i + 3]
+        for i, (name, corners) in enumerate(zip(self._geometry.ring_names, rings(nodes), strict=True)):
             radius = float(np.linalg.norm(corners[0] - corners.mean(axis=0)))
             is_tip = i == self._geometry.tip_ring
             ring = _locked(update, f"ring {name}", name, when)

@@ -17,9 +17,10 @@ from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from tcrctl.log.geometry import NODES_PER_MODULE, LogGeometry
+from tcrctl.log.geometry import LogGeometry
 from tcrctl.log.ring_frames import drawable, quaternion_of_normal, ring_frames
 from tcrctl.log.scene import REFERENCE, WORLD, Scene
+from tcrctl.robot.module import ring_nodes, rings
 from tcrctl.signals import Array, Measurement, Reference, StepRecord
 
 TOPICS: Final[dict[str, Any]] = {
@@ -74,7 +75,7 @@ class ViewerTopics:
         self._scene = Scene(geometry)
         self._static_written = False
         marker_of = {node: row for row, node in enumerate(geometry.marker_nodes)}
-        tip = [NODES_PER_MODULE * geometry.tip_ring + j for j in range(3)]
+        tip = ring_nodes(geometry.tip_ring)
         self._tip_markers = (
             [marker_of[node] for node in tip] if all(node in marker_of for node in tip) else None
         )
@@ -105,7 +106,7 @@ class ViewerTopics:
     def _poses(self, record: StepRecord, when: Timestamp) -> Iterator[tuple[str, bytes]]:
         nodes, reference = self._nodes(record), _reference(record.reference)
         if nodes is not None:
-            centre, turn = ring_frames(nodes.reshape(-1, NODES_PER_MODULE, 3)[:, :3])
+            centre, turn = ring_frames(rings(nodes))
             if drawable(centre, turn):
                 yield "/tf", self._frames(centre, turn, reference, when)
                 yield "/backbone", _backbone(centre, turn, when)

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from tcrctl.robot.equilibrium import equilibrium
-from tcrctl.robot.model import APEX, FIXED
+from tcrctl.robot.module import apexes
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
 
@@ -55,5 +55,5 @@ def model_displacements(robot: Robot) -> dict[str, Array]:
 
 
 def _endpoint(robot: Robot, q: Array) -> Array:
-    last: Array = q.reshape(-1, 3)[FIXED * robot.n_modules + APEX]
+    last: Array = apexes(q)[robot.n_modules]
     return last

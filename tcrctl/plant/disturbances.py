@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.plant.settings import DropoutSettings, PushSettings
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import ring_nodes
 from tcrctl.signals import Array
 
 
@@ -28,7 +28,7 @@ def pushed(weight: Array, pushes: Sequence[PushSettings], t: float) -> Array:
         return weight
     force = weight.reshape(-1, 3).copy()
     for push in acting:
-        force[FIXED * push.ring : FIXED * push.ring + 3] += np.array(push.force_n) / 3.0
+        force[list(ring_nodes(push.ring))] += np.array(push.force_n) / 3.0
     return force.ravel()
 
 

@@ -15,7 +15,7 @@ from tcrctl.plant.stroke import within_stroke
 from tcrctl.robot import dynamics, pose
 from tcrctl.robot.equations import make_workspace
 from tcrctl.robot.equilibrium import Equilibrium, equilibrium
-from tcrctl.robot.model import FIXED, ring_rows
+from tcrctl.robot.module import FIXED, module_of, ring_rows
 from tcrctl.robot.robot import Robot, mismatched
 from tcrctl.signals import Array, Command, Measurement, Truth
 
@@ -65,7 +65,7 @@ class SimulatedPlant:
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._work.tension[:] = rest.tension
         self._rows = np.array(ring_rows(robot.n_modules))
-        self._rings = self._rows // FIXED
+        self._rings = module_of(self._rows)
         rings = range(1, robot.n_modules + 1) if settings.measured_rings == "all" else settings.measured_rings
         self._valid = np.isin(self._rings, list(rings))
         self._seen = deque(

@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from tcrctl.analysis.skeleton import Skeleton
-from tcrctl.log.geometry import NODES_PER_MODULE
 from tcrctl.plots import style
+from tcrctl.robot.module import apexes, rings
 from tcrctl.signals import Array
 
 #: How far apart the nodes of a ring are on the circle; only the ring's outline is drawn with it.
@@ -24,10 +24,10 @@ def draw_body(axes: Any, nodes: Array, skeleton: Skeleton | None) -> None:
         nodes: Node positions (n_nodes, 3), in the unit of the axes.
         skeleton: Its springs and cables; only rings and rods are drawn without it.
     """
-    for module in nodes.reshape(-1, NODES_PER_MODULE, 3):
-        axes.plot(*ring_outline(module[:3]).T, color=style.GREY, lw=0.9)
-        for node in module[:3]:
-            axes.plot(*np.stack([node, module[3]]).T, color=style.GREY, lw=0.6)
+    for ring, apex in zip(rings(nodes), apexes(nodes), strict=True):
+        axes.plot(*ring_outline(ring).T, color=style.GREY, lw=0.9)
+        for node in ring:
+            axes.plot(*np.stack([node, apex]).T, color=style.GREY, lw=0.6)
     if skeleton is not None:
         for ends in skeleton.springs:
             axes.plot(*nodes[ends].T, color=style.GREEN, lw=0.6)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tcrctl.analysis.history import History
 from tcrctl.analysis.skeleton import read_skeleton
+from tcrctl.robot.module import NODES, module_count
 from tcrctl.signals import Array
 
 MOST_POINTS: Final = 4000
@@ -117,10 +118,11 @@ def _robot(history: History) -> dict[str, Any] | None:
     return {
         "t": _floats(history.t[history.shape_step[frames]]),
         "count": nodes.shape[1],
+        "per_module": NODES,
         "nodes": _bytes(np.round((nodes - middle) / scale).astype("<i2")),
         "middle": middle.tolist(),
         "scale": scale,
-        "tip": nodes.shape[1] // 4 - 1 if skeleton is None else skeleton.tip_ring,
+        "tip": module_count(nodes.shape[1]) if skeleton is None else skeleton.tip_ring,
         "springs": [] if skeleton is None else skeleton.springs.tolist(),
         "cables": []
         if skeleton is None

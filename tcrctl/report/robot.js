@@ -164,9 +164,10 @@ class RobotView {
   drawRobot(c) {
     const robot = DATA.robot, nodes = this.nodesAt(clock.t), body = colour("robot"), tip = colour("tip");
     const thick = Math.min(4, Math.max(1, this.pixels * 0.004));
+    const per = robot.per_module;
     let end = null;
-    for (let module = 0; 4 * module < robot.count; module++) {
-      const [a, b, d, apex] = nodes.slice(4 * module, 4 * module + 4), isTip = module === robot.tip;
+    for (let module = 0; per * module < robot.count; module++) {
+      const [a, b, d, apex] = nodes.slice(per * module, per * (module + 1)), isTip = module === robot.tip;
       const centre = scaled(add(add(a, b), d), 1 / 3), arm = add(a, centre, -1), radius = Math.hypot(...arm);
       const across = scaled(unit(add(b, d, -1)), radius), around = 24;
       const on = (k) => add(add(centre, arm, Math.cos((2 * Math.PI * k) / around)), across, Math.sin((2 * Math.PI * k) / around));

@@ -16,6 +16,7 @@ from tcrctl.elements import bar, sliding_cable
 from tcrctl.numerics.generalized_alpha import coefficients
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, Workspace
 from tcrctl.robot.model import Model
+from tcrctl.robot.module import SIZE
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.signals import Array
 
@@ -64,7 +65,7 @@ def rest_state(q: Array, drive: Array) -> State:
 
 def make_scratch(model: Model) -> Scratch:
     """Allocate the arrays for ``model``."""
-    size, bars, m = 12 * (model.mass.shape[0] + 1), model.bars.shape[0], model.cables.shape[0]
+    size, bars, m = SIZE * (model.mass.shape[0] + 1), model.bars.shape[0], model.cables.shape[0]
     return Scratch(
         np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(m), np.zeros((4, size)),
         np.zeros(bars), np.zeros(bars), np.zeros(m),

@@ -21,7 +21,8 @@ from numba import njit
 
 from tcrctl.elements import bar, sliding_cable
 from tcrctl.robot import tangent
-from tcrctl.robot.model import FIXED, Model
+from tcrctl.robot.model import Model
+from tcrctl.robot.module import FIXED, SIZE
 from tcrctl.signals import Array
 
 #: Rows of ``Load.nodal``.
@@ -75,16 +76,16 @@ class Workspace(NamedTuple):
 def make_workspace(model: Model) -> Workspace:
     """Allocate the arrays for ``model``."""
     n, m = model.mass.shape[0], model.cables.shape[0]
-    shape = (n, model.bandwidth + 1, 12, 12)
+    shape = (n, model.bandwidth + 1, SIZE, SIZE)
     return Workspace(
         K=np.zeros(shape),
         U=np.zeros(shape),
-        r=np.zeros(12 * n),
-        G=np.zeros((m, 12 * (n + 1))),
+        r=np.zeros(SIZE * n),
+        G=np.zeros((m, SIZE * (n + 1))),
         tension=np.zeros(m),
         axial=np.zeros(m),
         length=np.zeros(m),
-        columns=np.zeros((12 * n, m + 1)),
+        columns=np.zeros((SIZE * n, m + 1)),
         small=np.zeros((m, m)),
     )
 
@@ -137,10 +138,10 @@ def _start(q: Array, mass: Array, inertia: float, nodal: Array, r: Array) -> flo
     """Start r with inertia, virtual springs and external forces of (*); return their potential [J]."""
     energy = 0.0
     for k in range(r.shape[0]):
-        i, a, g = k // 12, k % 12, 12 + k
+        i, a, g = k // SIZE, k % SIZE, 3 * FIXED + k
         force = 0.0
         if inertia != 0.0:
-            for b in range(12):
+            for b in range(SIZE):
                 force += mass[i, a, b] * (q[g - a + b] - nodal[Q_FREE, g - a + b])
             force *= inertia
             energy += 0.5 * force * (q[g] - nodal[Q_FREE, g])

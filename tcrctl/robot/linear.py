@@ -16,7 +16,7 @@ from numba import njit
 
 from tcrctl.numerics import block_banded
 from tcrctl.robot.equations import Workspace
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import FIXED
 from tcrctl.signals import Array
 
 #: First diagonal shift tried on an indefinite tangent, as a fraction of its mean diagonal.

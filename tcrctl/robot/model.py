@@ -15,17 +15,24 @@ from numpy.typing import NDArray
 
 from tcrctl.elements import bar, sliding_cable, torus
 from tcrctl.robot.description import RobotDescription, cable_routes, spring_list
+from tcrctl.robot.module import FIXED as FIXED
+from tcrctl.robot.module import (
+    NODES,
+    RIGID_BARS,
+    RING,
+    SIZE,
+    mass_block,
+    module_of,
+    node_index,
+    rigid_bars,
+    ring_nodes,
+    straight_stack,
+)
 from tcrctl.signals import Array
-
-#: Nodes of one module, and of the fixed base: three on the ring and the apex.
-FIXED = 4
-APEX = 3
-#: Rods and ring sides per module; they come first among the bars.
-RIGID_BARS = 6
 
 
 class Model(NamedTuple):
-    """What the kernels read: the arrays of one robot, read-only. Node numbering: tcrctl/__init__.py.
+    """What the kernels read: the arrays of one robot, read-only. Node numbering: robot.module.
 
     Attributes:
         mass: Mass matrix: rings (4), rods, springs; one block per free module (n_modules, 12, 12) [kg].
@@ -50,52 +57,12 @@ class Model(NamedTuple):
     cables: Array
 
 
-def node_index(name: str) -> int:
-    """Row of a node named ``base.n1`` .. ``m7.apex``."""
-    module, _, node = name.partition(".")
-    number = 0 if module == "base" else int(module[1:])
-    return FIXED * number + {"n1": 0, "n2": 1, "n3": 2, "apex": APEX}[node]
-
-
-def ring_rows(n_modules: int) -> list[int]:
-    """Node rows of all ring nodes of the free modules, in order."""
-    return [FIXED * ring + k for ring in range(1, n_modules + 1) for k in range(3)]
-
-
-def _stack(d: RobotDescription) -> Array:
-    """Node positions of the straight, undeformed stack (n_nodes, 3) [m]."""
-    radius, pitch = d.modules.ring_diameter_mm / 2000.0, d.modules.pitch_mm / 1000.0
-    nodes = np.zeros((FIXED * (d.modules.count + 1), 3))
-    for module in range(d.modules.count + 1):
-        for k in range(3):
-            angle = k * torus.TURN_THIRD
-            nodes[FIXED * module + k] = [radius * math.cos(angle), radius * math.sin(angle), -module * pitch]
-        nodes[FIXED * module + APEX] = [0.0, 0.0, -module * pitch - d.modules.cone_height_mm / 1000.0]
-    return nodes
-
-
-def _module_bars(module: int) -> list[tuple[int, int]]:
-    """Three rods and three ring sides of one module as pairs of node rows."""
-    ring = (FIXED * module, FIXED * module + 1, FIXED * module + 2)
-    return [(node, FIXED * module + APEX) for node in ring] + torus.sides(ring)
-
-
 def _mass_matrix(d: RobotDescription) -> Array:
     """(n_modules, 12, 12): ring by (4), rods consistent, springs lumped on their end nodes [kg]."""
-    n = d.modules.count
-    cell = d.modules.mass_g / 1000.0
-    block = np.zeros((4, 4))
-    for k in range(3):
-        block[k, k] += torus.node_mass(cell * d.modules.ring_mass_fraction)
-        rod = cell * (1.0 - d.modules.ring_mass_fraction) / 3.0
-        for i, j in ((k, k), (APEX, APEX)):
-            block[i, j] += rod / 3.0
-        block[k, APEX] += rod / 6.0
-        block[APEX, k] += rod / 6.0
-    blocks = np.repeat(block[None], n + 1, axis=0)
+    blocks = np.repeat(mass_block(d.modules)[None], d.modules.count + 1, axis=0)
     for spring in spring_list(d):
         for node in (node_index(name) for name in spring.nodes):
-            blocks[node // FIXED, node % FIXED, node % FIXED] += spring.mass / 2.0
+            blocks[module_of(node), node % NODES, node % NODES] += spring.mass / 2.0
     return np.stack([np.kron(b, np.eye(3)) for b in blocks[1:]])
 
 
@@ -103,7 +70,7 @@ def _bars(d: RobotDescription, nodes: Array) -> tuple[NDArray[np.int64], Array]:
     """End nodes and parameters of rods and ring sides of the free modules (RIGID_BARS each), then springs."""
     section = math.pi / 4.0 * (d.modules.rod_diameter_mm / 1000.0) ** 2
     ea = d.modules.youngs_modulus_mpa * 1e6 * section
-    pairs = [pair for module in range(1, d.modules.count + 1) for pair in _module_bars(module)]
+    pairs = [pair for module in range(1, d.modules.count + 1) for pair in rigid_bars(module)]
     lengths = [float(np.linalg.norm(nodes[j] - nodes[i])) for i, j in pairs]
     rows = [[length, ea / length, d.modules.damping_n_s_m, 0.0] for length in lengths]
     for spring in spring_list(d):
@@ -118,7 +85,7 @@ def _holes(d: RobotDescription) -> tuple[NDArray[np.int64], NDArray[np.int64], A
     nodes, weights, first = [], [], [0]
     for route in cable_routes(d):
         for ring, angle in route.holes:
-            nodes.append([FIXED * ring + k for k in range(3)])
+            nodes.append(ring_nodes(ring))
             weights.append(torus.point_weights(angle))
         first.append(len(nodes))
     return np.array(first, dtype=np.int64), np.array(nodes, dtype=np.int64), np.array(weights)
@@ -127,10 +94,10 @@ def _holes(d: RobotDescription) -> tuple[NDArray[np.int64], NDArray[np.int64], A
 def _bandwidth(bars: NDArray[np.int64], hole_nodes: NDArray[np.int64], first: NDArray[np.int64]) -> int:
     """Largest distance in modules between two coupled free modules; at least 1."""
     widths = [1]
-    for i, j in bars // FIXED:
+    for i, j in module_of(bars):
         if i > 0 and j > 0:
             widths.append(abs(int(i) - int(j)))
-    rings = hole_nodes[:, 0] // FIXED
+    rings = module_of(hole_nodes[:, 0])
     for c in range(first.shape[0] - 1):
         path = rings[first[c] : first[c + 1]]
         widths += [abs(int(b) - int(a)) for a, b in itertools.pairwise(path) if a > 0 and b > 0]
@@ -149,21 +116,21 @@ def freeze(model: Model) -> Model:
 
 def undeformed(d: RobotDescription) -> Array:
     """Node positions of the straight stack (3 n_nodes,) [m], where no rod is stretched."""
-    return _stack(d).ravel()
+    return straight_stack(d.modules).ravel()
 
 
 def gravity_force(model: Model, gravity: Array) -> Array:
     """Weight of every node coordinate (3 n_nodes,) [N] for gravity (3,) [m/s2]; zero on the base."""
-    force = np.zeros(12 * (model.mass.shape[0] + 1))
+    force = np.zeros(SIZE * (model.mass.shape[0] + 1))
     for i, block in enumerate(model.mass):
-        force[12 * (i + 1) : 12 * (i + 2)] = block @ np.tile(gravity, 4)
+        force[SIZE * (i + 1) : SIZE * (i + 2)] = block @ np.tile(gravity, NODES)
     return force
 
 
 def build_model(d: RobotDescription, cable_rest: Array) -> Model:
     """Kernel arrays of the robot described by ``d`` with cable rest lengths (m,) [m], lead included."""
     first_hole, hole_nodes, hole_weights = _holes(d)
-    bar_nodes, bars = _bars(d, _stack(d))
+    bar_nodes, bars = _bars(d, straight_stack(d.modules))
     routes = cable_routes(d)
     ea = np.array([route.axial_stiffness for route in routes])
     damping, lead = np.array([route.damping for route in routes]), np.array([route.lead for route in routes])
@@ -193,6 +160,6 @@ def scaled(model: Model, springs: float = 1.0, cables: float = 1.0, density: flo
 def with_load(model: Model, ring: int, mass: float) -> Model:
     """Twin of ``model`` whose ring with first node row ``ring`` carries ``mass`` [kg], a third on each node."""
     blocks = model.mass.copy()
-    load = blocks[ring // FIXED - 1]
-    load[np.arange(3 * APEX), np.arange(3 * APEX)] += mass / 3.0
+    load = blocks[module_of(ring) - 1]
+    load[np.arange(3 * RING), np.arange(3 * RING)] += mass / 3.0
     return freeze(model._replace(mass=blocks))

@@ -13,7 +13,8 @@ import numpy as np
 from tcrctl.numerics import block_banded
 from tcrctl.robot.equations import assemble, make_workspace
 from tcrctl.robot.equilibrium import Equilibrium, static_load
-from tcrctl.robot.model import FIXED, Model
+from tcrctl.robot.model import Model
+from tcrctl.robot.module import FIXED
 from tcrctl.signals import Array
 
 

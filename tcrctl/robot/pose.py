@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import FIXED
 from tcrctl.signals import Array
 
 

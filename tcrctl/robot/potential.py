@@ -15,7 +15,8 @@ from numba import njit
 
 from tcrctl.robot import linear
 from tcrctl.robot.equations import Load, Workspace, fill_tangent, residual
-from tcrctl.robot.model import FIXED, Model
+from tcrctl.robot.model import Model
+from tcrctl.robot.module import FIXED
 from tcrctl.signals import Array
 
 ARMIJO = 1e-4

@@ -24,7 +24,8 @@ from tcrctl.elements.sliding_cable import STIFFNESS
 from tcrctl.numerics import block_banded
 from tcrctl.robot import linear, pose
 from tcrctl.robot.equations import Workspace
-from tcrctl.robot.model import FIXED, Model
+from tcrctl.robot.model import Model
+from tcrctl.robot.module import FIXED, SIZE
 from tcrctl.signals import Array
 
 GAMMA = 1.0 - np.sqrt(0.5)
@@ -38,14 +39,14 @@ DEPENDENT = 1e-6
 def mass_columns(mass: Array, X: Array, out: Array) -> None:
     """out = M X for columns X (12 n_modules, r)."""
     for k in range(X.shape[0]):
-        i, a = k // 12, k % 12
+        i, a = k // SIZE, k % SIZE
         for c in range(X.shape[1]):
             out[k, c] = 0.0
-        for b in range(12):
+        for b in range(SIZE):
             value = mass[i, a, b]
             if value != 0.0:
                 for c in range(X.shape[1]):
-                    out[k, c] += value * X[12 * i + b, c]
+                    out[k, c] += value * X[SIZE * i + b, c]
 
 
 @njit(cache=True, error_model="numpy")

@@ -15,7 +15,8 @@ from tcrctl.robot.equilibrium import (
     equilibrium_with_tensions,
     with_rest_lengths,
 )
-from tcrctl.robot.model import FIXED, Model, build_model, gravity_force, scaled, undeformed, with_load
+from tcrctl.robot.model import Model, build_model, gravity_force, scaled, undeformed, with_load
+from tcrctl.robot.module import FIXED, SIZE, ring_nodes
 from tcrctl.signals import Array
 
 
@@ -106,7 +107,7 @@ def build_robot(description: RobotDescription) -> Robot:
         model=model,
         weight=weight,
         rest=rest,
-        tip=FIXED * description.tip.ring,
+        tip=ring_nodes(description.tip.ring)[0],
         stroke=(low / 1000.0, high / 1000.0),
         tension_limit=description.tension_limit_n,
     )
@@ -127,7 +128,7 @@ def mismatched(
     Raises:
         NoEquilibriumError: If that robot has no stable shape at zero drive.
     """
-    gravity = np.linalg.solve(robot.model.mass[0], robot.weight[3 * FIXED : 6 * FIXED])[:3]
+    gravity = np.linalg.solve(robot.model.mass[0], robot.weight[3 * FIXED : 3 * FIXED + SIZE])[:3]
     model = with_load(scaled(robot.model, springs, cables, density), robot.tip, tip_load)
     weight = gravity_force(model, gravity)
     rest = equilibrium(model, np.zeros(robot.n_cables), weight, robot.rest.q)

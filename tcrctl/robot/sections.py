@@ -7,10 +7,11 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import Discriminator, Field, Tag
 
 from tcrctl.config.settings import Settings, quantity
+from tcrctl.robot.module import LABELS
 
 Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
-NodeName: TypeAlias = Annotated[str, Field(pattern=r"^(base|m[1-9][0-9]*)\.(n1|n2|n3|apex)$")]
-JointNode: TypeAlias = Annotated[str, Field(pattern=r"^(upper|lower)\.(n1|n2|n3|apex)$")]
+NodeName: TypeAlias = Annotated[str, Field(pattern=rf"^(base|m[1-9][0-9]*)\.({'|'.join(LABELS)})$")]
+JointNode: TypeAlias = Annotated[str, Field(pattern=rf"^(upper|lower)\.({'|'.join(LABELS)})$")]
 Degrees: TypeAlias = Annotated[
     float,
     Field(

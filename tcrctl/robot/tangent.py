@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from tcrctl.elements import bar, sliding_cable
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import FIXED, NODES, SIZE
 from tcrctl.signals import Array
 
 
@@ -35,8 +35,8 @@ def _add_pair(K: Array, i: int, j: int, f: float, s: Array) -> None:
         return
     if i > j:
         i, j = j, i
-    block = K[i // 4 - 1, j // 4 - i // 4]
-    a, b = 3 * (i % 4), 3 * (j % 4)
+    block = K[i // NODES - 1, j // NODES - i // NODES]
+    a, b = 3 * (i % NODES), 3 * (j % NODES)
     block[a, b] += f * s[0]
     block[a, b + 1] += f * s[1]
     block[a, b + 2] += f * s[2]
@@ -52,13 +52,13 @@ def _add_pair(K: Array, i: int, j: int, f: float, s: Array) -> None:
 def start(K: Array, mass: Array, inertia: float, spring: Array) -> None:
     """Set K to inertia M + S; mass (n_modules, 12, 12) [kg], inertia [1/s2], spring (3 n_nodes,) [N/m]."""
     for j in range(K.shape[0]):
-        for a in range(12):
-            for b in range(12):
+        for a in range(SIZE):
+            for b in range(SIZE):
                 K[j, 0, a, b] = inertia * mass[j, a, b]
-            K[j, 0, a, a] += spring[12 * (j + 1) + a]
+            K[j, 0, a, a] += spring[SIZE * (j + 1) + a]
         for d in range(1, K.shape[1]):
-            for a in range(12):
-                for b in range(12):
+            for a in range(SIZE):
+                for b in range(SIZE):
                     K[j, d, a, b] = 0.0
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from tcrctl.robot.model import APEX, FIXED
+from tcrctl.robot.module import LABELS, RING, apexes, module_names, rings
 from tcrctl.signals import Array
 
 #: Sides of the polygon that stands for a ring. It is drawn around the circle, so that it never misses a contact and
@@ -29,8 +29,7 @@ def segments(q: Array) -> tuple[Array, Array]:
         Where they begin and where they end, both (n_modules + 1) (3 + SIDES) rows (n, 3) [m]; see
         :func:`segment_name` for their order.
     """
-    nodes = q.reshape(-1, FIXED, 3)
-    ring, apex = nodes[:, :APEX], nodes[:, APEX:]
+    ring, apex = rings(q), apexes(q)[:, None]
     centre = ring.mean(axis=1, keepdims=True)
     first = ring[:, :1] - centre
     second = (ring[:, 1:2] - ring[:, 2:3]) / math.sqrt(3.0)
@@ -43,6 +42,6 @@ def segments(q: Array) -> tuple[Array, Array]:
 
 def segment_name(row: int) -> str:
     """Name of the part that a row of :func:`segments` belongs to."""
-    module, part = divmod(row, APEX + SIDES)
-    name = "base" if module == 0 else f"m{module}"
-    return f"rod {name}.n{part + 1}" if part < APEX else f"ring {name}"
+    module, part = divmod(row, RING + SIDES)
+    name = module_names(module)[module]
+    return f"rod {name}.{LABELS[part]}" if part < RING else f"ring {name}"

@@ -12,7 +12,8 @@ from tcrctl.plant.settings import DropoutSettings, PushSettings, SimulatedSettin
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
 from tcrctl.robot.equilibrium import equilibrium
-from tcrctl.robot.model import FIXED, gravity_force
+from tcrctl.robot.model import gravity_force
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.robot import mismatched
 from tcrctl.signals import Command
 

@@ -8,7 +8,7 @@ import pytest
 from tcrctl.errors import DivergenceError
 from tcrctl.plant.settings import Mismatch, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
-from tcrctl.robot.model import FIXED, ring_rows
+from tcrctl.robot.module import FIXED, ring_rows
 from tcrctl.signals import Command
 
 PERIOD = 0.05

@@ -10,7 +10,7 @@ from support.mechanics import FREE
 from tcrctl.elements import sliding_cable
 from tcrctl.robot import linear
 from tcrctl.robot.equations import assemble, make_workspace, residual
-from tcrctl.robot.model import FIXED, ring_rows
+from tcrctl.robot.module import FIXED, ring_rows
 
 ROBOTS = ["tcr600", "tcr700", "tcr5x4"]
 RULES = {

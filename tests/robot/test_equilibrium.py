@@ -19,7 +19,8 @@ from tcrctl.robot.equilibrium import (
     static_load,
     with_rest_lengths,
 )
-from tcrctl.robot.model import APEX, FIXED, RIGID_BARS, build_model, scaled
+from tcrctl.robot.model import build_model, scaled
+from tcrctl.robot.module import APEX, FIXED, RIGID_BARS
 from tcrctl.robot.robot import build_robot, mismatched
 
 ROBOTS = ["tcr600", "tcr700", "tcr5x4"]

@@ -25,7 +25,7 @@ from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.plant import RigPlant
 from tcrctl.plant.rig.session import Session
 from tcrctl.plant.rig.settings import RigFile
-from tcrctl.robot.model import ring_rows
+from tcrctl.robot.module import ring_rows
 from tcrctl.signals import Command
 
 PERIOD, SPEED = 0.02, 0.01

@@ -11,7 +11,8 @@ from tcrctl.numerics import block_banded
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.equations import FORCE, Load, make_workspace, residual
 from tcrctl.robot.equilibrium import static_load
-from tcrctl.robot.model import FIXED, Model, freeze
+from tcrctl.robot.model import Model, freeze
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.robot import build_robot
 
 FREE = 3 * FIXED

@@ -13,6 +13,7 @@ from tcrctl.plant.rig.session import Session
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
 from tcrctl.plant.rig.settings import MountedRobot, SafetyRules
 from tcrctl.plant.rig.sight import Rules
+from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, session: Session) 
         rules=supervisor_rules(rules),
         min_seen=rules.min_seen_fraction,
         mapped=cameras.mapped,
-        nodes=3 * robot.n_modules,
+        nodes=len(ring_rows(robot.n_modules)),
         arm_timeout=rules.arm_timeout_s,
     )
     return RigPlant(cameras, drives, limits, period, session)

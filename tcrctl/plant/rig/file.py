@@ -11,6 +11,7 @@ from tcrctl.config.strict_yaml import Document, Keys
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.plant.rig.settings import MountedRobot, RigFile
 from tcrctl.robot.description import RobotDescription, cable_routes
+from tcrctl.robot.module import is_ring_node, module_of, node_index
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +102,5 @@ def _marker_misfits(mounted: MountedRobot, count: int, at: Keys) -> Iterator[tup
         if ring > count:
             yield (*at, "rings", i), f"there is no ring {ring}; there are rings 1 to {count}"
     for i, marker in enumerate(mounted.markers.nodes):
-        module, _, node = marker.node.partition(".")
-        if module == "base" or node == "apex" or int(module[1:]) > count:
+        if not is_ring_node(marker.node) or not 1 <= module_of(node_index(marker.node)) <= count:
             yield (*at, "nodes", i, "node"), f"must be a ring node m1.n1 .. m{count}.n3, not {marker.node}"

@@ -19,7 +19,7 @@ from tcr_hardware.rigid_transform import RigidTransform
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.devices import Sighting
 from tcrctl.plant.rig.settings import Calibration, CameraSettings, MarkerSettings
-from tcrctl.robot.model import node_index, ring_rows
+from tcrctl.robot.module import node_index, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import RawFrame
 
@@ -112,7 +112,7 @@ class NatNetCameras:
                 self.rate = cameras.rate_hz or self.client.frame_rate()
                 self._map, self._rows = _marker_map(cameras, markers, calibration, robot)
                 self._check_labels()
-            self._n_nodes = 3 * robot.n_modules
+            self._n_nodes = len(ring_rows(robot.n_modules))
         except BaseException:
             self.client.close()
             raise

@@ -1,0 +1,140 @@
+"""The module of the robot, a cone: three nodes on a ring, an apex, and three rods between them.
+
+All that follows from it is here: how nodes are numbered and named, what is rigid, where the mass is. Everybody
+else asks for rings, apexes and rows. Kernels know the two sizes, ``NODES`` and ``SIZE``, and that the fixed base,
+module 0, comes first. Another kind of module, a disc on a backbone for instance, begins as another file like this.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcrctl.elements import torus
+from tcrctl.signals import Array
+
+if TYPE_CHECKING:
+    from tcrctl.robot.sections import ModuleSettings
+
+LABELS: Final = ("n1", "n2", "n3", "apex")
+#: Nodes of one module: first those of its ring, counter-clockwise seen from +z, then the apex.
+NODES: Final = 4
+RING: Final = 3
+APEX: Final = 3
+#: Coordinates of one module: size of the blocks of mass and tangent.
+SIZE: Final = 3 * NODES
+#: Nodes of the fixed base; their rows come first.
+FIXED: Final = NODES
+#: Rods and ring sides per module; they come first among the bars.
+RIGID_BARS: Final = 6
+
+_Rows = TypeVar("_Rows", int, NDArray[np.int64])
+
+
+def node_count(n_modules: int) -> int:
+    """Return the number of nodes of a robot, base included."""
+    return NODES * (n_modules + 1)
+
+
+def module_count(n_nodes: int) -> int:
+    """Return the number of free modules of a robot with so many nodes."""
+    return n_nodes // NODES - 1
+
+
+def module_of(rows: _Rows) -> _Rows:
+    """Return the module that node rows belong to; 0 is the base."""
+    return rows // NODES
+
+
+def ring_nodes(module: int) -> tuple[int, int, int]:
+    """Return the rows of the three ring nodes of a module."""
+    first = NODES * module
+    return first, first + 1, first + 2
+
+
+def ring_rows(n_modules: int) -> list[int]:
+    """Return the rows of all ring nodes of the free modules, in order."""
+    return [row for module in range(1, n_modules + 1) for row in ring_nodes(module)]
+
+
+def apex_row(module: int) -> int:
+    """Return the row of the apex of a module."""
+    return NODES * module + APEX
+
+
+def rings(nodes: Array) -> Array:
+    """Return the ring nodes of all modules (n_modules + 1, 3, 3) out of all nodes (n_nodes, 3)."""
+    return nodes.reshape(-1, NODES, 3)[:, :RING]
+
+
+def apexes(nodes: Array) -> Array:
+    """Return the apexes of all modules (n_modules + 1, 3) out of all nodes (n_nodes, 3)."""
+    return nodes.reshape(-1, NODES, 3)[:, APEX]
+
+
+def module_names(n_modules: int) -> tuple[str, ...]:
+    """Return ``base, m1, m2, ...``."""
+    return ("base", *(f"m{i}" for i in range(1, n_modules + 1)))
+
+
+def node_names(n_modules: int) -> tuple[str, ...]:
+    """Return ``base.n1, base.n2, ..., m1.apex, ...`` in row order."""
+    return tuple(f"{name}.{label}" for name in module_names(n_modules) for label in LABELS)
+
+
+def node_index(name: str) -> int:
+    """Return the row of a node named ``base.n1`` .. ``m7.apex``."""
+    module, _, label = name.partition(".")
+    return NODES * (0 if module == "base" else int(module[1:])) + LABELS.index(label)
+
+
+def is_ring_node(name: str) -> bool:
+    """Return whether a node of that name is on a ring."""
+    return name.partition(".")[2] in LABELS[:RING]
+
+
+def rods(module: int) -> list[tuple[int, int]]:
+    """Return the rods of a module as pairs of node rows, ring node and apex."""
+    return [(node, apex_row(module)) for node in ring_nodes(module)]
+
+
+def rigid_bars(module: int) -> list[tuple[int, int]]:
+    """Return rods and ring sides of a module, RIGID_BARS pairs of node rows."""
+    return rods(module) + torus.sides(ring_nodes(module))
+
+
+def straight_stack(modules: ModuleSettings) -> Array:
+    """Return the node positions of the straight, undeformed stack (n_nodes, 3) [m].
+
+    Args:
+        modules: Section of the robot file.
+    """
+    radius, pitch = modules.ring_diameter_mm / 2000.0, modules.pitch_mm / 1000.0
+    nodes = np.zeros((node_count(modules.count), 3))
+    for module in range(modules.count + 1):
+        for k, row in enumerate(ring_nodes(module)):
+            angle = k * torus.TURN_THIRD
+            nodes[row] = [radius * math.cos(angle), radius * math.sin(angle), -module * pitch]
+        nodes[apex_row(module)] = [0.0, 0.0, -module * pitch - modules.cone_height_mm / 1000.0]
+    return nodes
+
+
+def mass_block(modules: ModuleSettings) -> Array:
+    """Return the masses of one module by node pairs (NODES, NODES) [kg]: ring by (4), rods consistent.
+
+    Args:
+        modules: Section of the robot file.
+    """
+    cell = modules.mass_g / 1000.0
+    block = np.zeros((NODES, NODES))
+    for k in range(RING):
+        block[k, k] += torus.node_mass(cell * modules.ring_mass_fraction)
+        rod = cell * (1.0 - modules.ring_mass_fraction) / 3.0
+        for i, j in ((k, k), (APEX, APEX)):
+            block[i, j] += rod / 3.0
+        block[k, APEX] += rod / 6.0
+        block[APEX, k] += rod / 6.0
+    return block
