@@ -85,6 +85,9 @@ class MutatingWire:
         return self._near.fileno()
 
     def close(self):
+        """The client hangs up; the wire stays for its next call."""
+
+    def cut(self):
         self._near.close()
         self._far.close()
 

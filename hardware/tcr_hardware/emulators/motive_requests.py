@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import struct
 import time
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from tcr_hardware.emulators import motive_encoder as encoder
 from tcr_hardware.emulators.motive_encoder import Version
-
-if TYPE_CHECKING:
-    from tcr_hardware.emulators.motive import MotiveEmulator
+from tcr_hardware.emulators.motive_link import MotiveLink
+from tcr_hardware.emulators.motive_scene import Scene
+from tcr_hardware.emulators.motive_settings import MotiveSettings
 
 NAME = "Motive (emulated)"
 CLOCK_HZ = 10_000_000
@@ -21,7 +21,31 @@ ECHOREQUEST, ECHORESPONSE, DISCOVERY, UNRECOGNIZED_REQUEST = 12, 13, 14, 100
 OPTIONS_AT = 264
 
 
-def answer(server: MotiveEmulator, datagram: bytes, address: tuple[str, int]) -> list[bytes]:
+class Server(Protocol):
+    """What an answer is made from.
+
+    Attributes:
+        settings: Settings of the server.
+        scene: Names and bodies.
+        version: Newest version served now.
+        link: Who is connected.
+    """
+
+    settings: MotiveSettings
+    scene: Scene
+    version: Version
+    link: MotiveLink
+
+    def ticks(self, at: float) -> int:
+        """Server clock at a time of ``time.monotonic`` [s]."""
+        ...
+
+    def latest(self, version: Version) -> bytes:
+        """The scene now, as one FRAMEOFDATA packet."""
+        ...
+
+
+def answer(server: Server, datagram: bytes, address: tuple[str, int]) -> list[bytes]:
     """Answers to one request, possibly none."""
     if len(datagram) < 4:
         return []
@@ -49,7 +73,7 @@ def answer(server: MotiveEmulator, datagram: bytes, address: tuple[str, int]) ->
     return [_unrecognized(server)]
 
 
-def _connect(server: MotiveEmulator, payload: bytes, address: tuple[str, int], *, discovery: bool) -> bytes:
+def _connect(server: Server, payload: bytes, address: tuple[str, int], *, discovery: bool) -> bytes:
     settings, wanted = server.settings, server.version
     if len(payload) >= OPTIONS_AT + 5 and server.version >= (4, 0):
         asked = (payload[OPTIONS_AT + 1], payload[OPTIONS_AT + 2])
@@ -63,7 +87,7 @@ def _connect(server: MotiveEmulator, payload: bytes, address: tuple[str, int], *
     return encoder.packet(SERVERINFO, info)
 
 
-def _request(server: MotiveEmulator, payload: bytes, address: tuple[str, int]) -> bytes:
+def _request(server: Server, payload: bytes, address: tuple[str, int]) -> bytes:
     name, _, argument = payload.partition(b"\0")[0].decode("utf-8", "replace").partition(",")
     if name == "FrameRate":
         return encoder.packet(RESPONSE, struct.pack("<f", server.settings.rate_hz))
@@ -76,7 +100,7 @@ def _request(server: MotiveEmulator, payload: bytes, address: tuple[str, int]) -
     return _unrecognized(server)
 
 
-def _bitstream(server: MotiveEmulator, argument: str, address: tuple[str, int]) -> bytes:
+def _bitstream(server: Server, argument: str, address: tuple[str, int]) -> bytes:
     client = server.link.clients.get(address)
     if not argument:
         major, minor = server.version if client is None else client.version
@@ -90,5 +114,5 @@ def _bitstream(server: MotiveEmulator, argument: str, address: tuple[str, int]) 
     return encoder.packet(RESPONSE, struct.pack("<i", 0))
 
 
-def _unrecognized(server: MotiveEmulator) -> bytes:
+def _unrecognized(server: Server) -> bytes:
     return encoder.packet(UNRECOGNIZED_REQUEST, encoder.sender(NAME, server.version))

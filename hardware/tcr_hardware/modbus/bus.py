@@ -25,7 +25,7 @@ from tcr_hardware.modbus.errors import (
     StaleAnswerError,
     WrongEchoError,
 )
-from tcr_hardware.modbus.link import ModbusLink
+from tcr_hardware.modbus.link import Dial, ModbusLink
 from tcr_hardware.modbus.liveness import Liveness
 from tcr_hardware.modbus.registers import MAP_VERSION, Control, Reject
 from tcr_hardware.modbus.settings import EXCHANGES, BusSettings
@@ -49,8 +49,12 @@ class PlcBus:
         statistics: Counts since the bus was made.
     """
 
-    def __init__(self, settings: BusSettings) -> None:
+    def __init__(self, settings: BusSettings, dial: Dial | None = None) -> None:
         """Prepare the bus; nothing is opened yet.
+
+        Args:
+            settings: The PLC.
+            dial: Opens something else than the network or the serial line; see :class:`ModbusLink`.
 
         Raises:
             MapError: A setting is not one of those allowed.
@@ -63,7 +67,8 @@ class PlcBus:
             if value not in allowed:
                 raise MapError([f"{name}: {value!r}; allowed: {', '.join(allowed)}"])
         self._settings, self._map = settings, settings.map
-        self._link = ModbusLink(settings.link, settings.unit, settings.timeout_s, self._map["MAGIC"].address)
+        probe = self._map["MAGIC"].address
+        self._link = ModbusLink(settings.link, settings.unit, settings.timeout_s, probe, dial)
         self._one_request = settings.exchange != "fc16_fc3"
         self._blocks, self._counters, self._liveness = Blocks(self._map, WordCodec()), Counters(), Liveness()
         self._info: PlcInfo | None = None

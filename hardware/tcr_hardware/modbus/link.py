@@ -14,6 +14,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from typing import Any
 
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException
@@ -40,10 +41,21 @@ PARSER_ERRORS = (ModbusException, ValueError, IndexError, struct.error)
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
+Dial = Callable[[], Any]
+"""Opens a connection; returns what the client of pymodbus takes for its socket."""
+
+
 class ModbusLink:
     """A connection to one unit."""
 
-    def __init__(self, link: TcpLink | RtuLink, unit: int, timeout_s: float, probe_address: int) -> None:
+    def __init__(
+        self,
+        link: TcpLink | RtuLink,
+        unit: int,
+        timeout_s: float,
+        probe_address: int,
+        dial: Dial | None = None,
+    ) -> None:
         """Prepare a connection.
 
         Args:
@@ -51,11 +63,12 @@ class ModbusLink:
             unit: Modbus unit number.
             timeout_s: How long one answer may take [s].
             probe_address: A register that can always be read, to settle a serial line.
+            dial: Opens what stands for the socket or the serial device; None opens the real one.
         """
         self._link, self._unit = link, unit
         self._timeout_s = self._usual_timeout_s = timeout_s
         self._probe_address = probe_address
-        self._client = _client(link, timeout_s)
+        self._client, self._dial = _client(link, timeout_s), dial
         self._unsure = False  # an answer may still be under way on a serial line
 
     @property
@@ -69,6 +82,10 @@ class ModbusLink:
         Raises:
             LinkLostError: The PLC or the serial device cannot be reached.
         """
+        if self._dial is not None:
+            self._client.socket = self._dial()
+            self._unsure = isinstance(self._link, RtuLink)
+            return
         if isinstance(self._link, RtuLink):
             if not self._client.connect():
                 raise LinkLostError(f"cannot open {self._link}", hint=_why_no_device(self._link.device))

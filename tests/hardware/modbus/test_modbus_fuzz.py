@@ -36,25 +36,18 @@ TIMEOUT_S = 0.001
 SLACK_S = 0.5
 
 
-def connect(link, monkeypatch, wire):
+def connect(link, wire, exchange="auto"):
     """A bus whose connection is a wire."""
-    bus = PlcBus(BusSettings(link, timeout_s=TIMEOUT_S, retries=0))
-    client = bus._link._client
-    client.socket = wire
-    monkeypatch.setattr(bus._link, "open", lambda: setattr(client, "socket", wire))
-    monkeypatch.setattr(client, "close", lambda: setattr(client, "socket", None))
-    return bus
+    return PlcBus(BusSettings(link, timeout_s=TIMEOUT_S, retries=0, exchange=exchange), dial=lambda: wire)
 
 
 @pytest.mark.parametrize("link", [TcpLink("plc"), RtuLink("plc")], ids=["tcp", "rtu"])
 @pytest.mark.parametrize("exchange", ["fc23", "fc16_fc3"])
-def test_no_answer_of_a_plc_raises_anything_but_our_errors(link, exchange, monkeypatch):
+def test_no_answer_of_a_plc_raises_anything_but_our_errors(link, exchange):
     serial, seen, slowest = isinstance(link, RtuLink), {}, 0.0
     for start in range(0, MUTANTS // 4, 25):
         wire = MutatingWire(PlcEmulator(), start, serial=serial)
-        bus = connect(link, monkeypatch, wire)
-        bus._settings = BusSettings(link, timeout_s=TIMEOUT_S, retries=0, exchange=exchange)
-        bus._one_request = exchange == "fc23"
+        bus = connect(link, wire, exchange)
         bus.open()
         wire.mutate = True
         for _ in range(25):
@@ -69,16 +62,16 @@ def test_no_answer_of_a_plc_raises_anything_but_our_errors(link, exchange, monke
                 assert all(getattr(status, item.name) is not None for item in fields(status))
             seen[outcome] = seen.get(outcome, 0) + 1
             slowest = max(slowest, time.monotonic() - began)
-        wire.close()
+        wire.cut()
     assert slowest < SLACK_S
     assert {"answer", "LinkTimeoutError"} <= set(seen), seen
     print(f"{sum(seen.values())} mutants over {link}, {exchange}: {seen}, slowest {1e3 * slowest:.1f} ms")
 
 
-def test_mutated_answers_leave_no_memory_behind(monkeypatch, caplog):
+def test_mutated_answers_leave_no_memory_behind(caplog):
     caplog.set_level(logging.CRITICAL + 1, logger="pymodbus")  # pytest keeps every message
     wire = MutatingWire(PlcEmulator(), 1, serial=False)
-    bus = connect(TcpLink("plc"), monkeypatch, wire)
+    bus = connect(TcpLink("plc"), wire)
     bus.open()
     wire.mutate = True
     sizes = []
@@ -93,7 +86,7 @@ def test_mutated_answers_leave_no_memory_behind(monkeypatch, caplog):
         assert tracemalloc.get_traced_memory()[1] < 4e6
     finally:
         tracemalloc.stop()
-        wire.close()
+        wire.cut()
     assert sizes[1] - sizes[0] < 50_000
 
 
