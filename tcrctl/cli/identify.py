@@ -138,6 +138,7 @@ def _loaded(
 def _from_data(data: list[str], robot: str, params: str, changes: list[str]) -> LoadedIdentification:
     """An identification that was told on the command line."""
     from tcrctl.config import strict_yaml
+    from tcrctl.config.keys import Keys
     from tcrctl.identify.loading import from_document
 
     told: dict[str, Any] = {
@@ -147,7 +148,7 @@ def _from_data(data: list[str], robot: str, params: str, changes: list[str]) -> 
         "parameters": {path.strip(): {} for path in params.split(",") if path.strip()},
         "data": [{"file": str(Path(file).absolute())} for file in data],
     }
-    places: dict[strict_yaml.Keys, str] = {
+    places: dict[Keys, str] = {
         ("robot",): "--robot",
         ("parameters",): "--params",
         ("data",): "--from",

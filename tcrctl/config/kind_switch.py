@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import BaseModel
 
 from tcrctl.config.strict_yaml import Document
+from tcrctl.config.unions import kind_of, models_in
 
 
 def without_former_keys(
@@ -32,7 +33,7 @@ def without_former_keys(
         return document, ()
     data, notes = dict(document.data), []
     for section, before, after in _switched(written, document.data):
-        kinds = {_kind(kind): kind for kind in _members(model, section)}
+        kinds = {kind_of(kind): kind for kind in _members(model, section)}
         if before["kind"] not in kinds or after["kind"] not in kinds:
             continue
         former, new = kinds[before["kind"]].model_fields, kinds[after["kind"]].model_fields
@@ -58,17 +59,4 @@ def _switched(before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[s
 
 def _members(model: type[BaseModel], section: str) -> list[type[BaseModel]]:
     field = model.model_fields.get(section)
-    return [] if field is None else list(_models_in(field.annotation))
-
-
-def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _models_in(part)
-
-
-def _kind(model: type[BaseModel]) -> str:
-    field = model.model_fields.get("kind")
-    names = get_args(field.annotation) if field else ()
-    return str(names[0]) if names else ""
+    return [] if field is None else [found for found, _ in models_in(field.annotation)]

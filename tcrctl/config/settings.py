@@ -8,12 +8,13 @@ from typing import Annotated, Any, Self, TypeAlias, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
+from tcrctl.config.keys import Finding, Keys, dotted
+
 T = TypeVar("T")
 NotNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
 Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
 Vector: TypeAlias = tuple[float, float, float]
-Path: TypeAlias = tuple[str | int, ...]
-"""Keys and list indices from the top of a document to one of its values."""
+Path: TypeAlias = Keys
 
 
 class Settings(BaseModel):
@@ -42,20 +43,20 @@ def quantity(unit: str, description: str, default: Any = ..., **bounds: Any) -> 
     return Field(default, description=text, json_schema_extra={"unit": unit}, **bounds)
 
 
-def refuse(problems: Iterable[tuple[Path, str]]) -> None:
+def refuse(problems: Iterable[Finding]) -> None:
     """Raise one validation error carrying every problem of a cross-check, if there is any.
 
     Meant for ``model_validator(mode="after")``; ``strict_yaml.validate`` gives each its own position.
 
     Args:
-        problems: Path of the offending value below the model at hand, and what is wrong with it.
+        problems: Place of the offending value below the model at hand, and what is wrong with it.
 
     Raises:
         PydanticCustomError: If there is at least one problem; ``context["problems"]`` holds them.
     """
     found = list(problems)
     if found:
-        text = "; ".join(f"{'.'.join(map(str, path))}: {message}" for path, message in found)
+        text = "; ".join(f"{dotted(keys)}: {message}" for keys, message in found)
         raise PydanticCustomError("cross_check", "{text}", {"text": text, "problems": found})
 
 

@@ -9,13 +9,15 @@ Scalars follow the YAML 1.2 core schema: ``1e-3`` is a number, ``off`` and ``12:
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from yaml.nodes import MappingNode, Node, SequenceNode
 
-from tcrctl.config.yaml_core import Builder, Keys, compose, dumps, position
+from tcrctl.config.keys import Finding, Keys, dotted
+from tcrctl.config.yaml_core import Builder, compose, dumps, position
 from tcrctl.errors import InputError, Problem, SpecError
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 Model = TypeVar("Model", bound="BaseModel")
 
-__all__ = ["Document", "Keys", "dumps", "load", "loads", "override", "placed", "read", "validate"]
+__all__ = ["Document", "dumps", "load", "loads", "override", "placed", "read", "validate"]
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,25 @@ class Document:
             if path[:length] in self._overridden:
                 return self._overridden[path[:length]]
         return position(self.name, self._mark(path))
+
+    def problem(self, keys: Keys, message: str) -> Problem:
+        """Return what is wrong with a value, with its place.
+
+        Args:
+            keys: The value.
+            message: What is wrong with it.
+        """
+        return Problem(self.where(keys), dotted(keys), message)
+
+    def refuse(self, findings: Iterable[Finding]) -> None:
+        """Raise SpecError with everything that was found wrong, if anything was.
+
+        Args:
+            findings: Which values, and what is wrong with them.
+        """
+        problems = [self.problem(keys, message) for keys, message in findings]
+        if problems:
+            raise SpecError(problems)
 
     def _mark(self, path: Keys) -> Any:
         node, mark = self._root, self._root.start_mark if self._root else None
@@ -198,7 +219,7 @@ def _assigned(old: Any, keys: list[str], value: Any, path: Keys, made: dict[Keys
             made[here] = where
         below = old.get(keys[0], {})
         return {**old, keys[0]: _assigned(below, keys[1:], value, here, made, where)}
-    name = ".".join(map(str, path)) or "the file"
+    name = dotted(path) or "the file"
     if not isinstance(old, list):
         raise _refused(where, f"{name} is {old!r}, neither a map nor a list")
     if not re.fullmatch("[0-9]{1,9}", keys[0]) or int(keys[0]) >= len(old):
@@ -228,7 +249,7 @@ def validate(document: Document, model: type[Model]) -> Model:
     problems = [problem for _, problem in document.broken]
     for path, message in found:
         if not any(path[: len(prefix)] == prefix for prefix in lost):
-            problems.append(Problem(document.where(path), ".".join(map(str, path)), message))
+            problems.append(document.problem(path, message))
     if settings is None or problems:
         raise SpecError(sorted(problems, key=_file_order))
     return settings

@@ -5,14 +5,14 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Iterator
-from typing import Any, TypeAlias, TypeVar, get_args
+from typing import Any, TypeVar
 
-from pydantic import BaseModel, Tag, ValidationError
+from pydantic import BaseModel, ValidationError
+
+from tcrctl.config.keys import Finding, Keys
+from tcrctl.config.unions import Tagged, kind_of, models_in
 
 Model = TypeVar("Model", bound=BaseModel)
-Keys: TypeAlias = tuple[str | int, ...]
-Finding: TypeAlias = tuple[Keys, str]
-_Tagged: TypeAlias = tuple[type[BaseModel], str]
 
 _TEMPLATES = {
     "missing": "required key is missing",
@@ -118,13 +118,13 @@ def _closest(given: Any, allowed: list[str]) -> str:
     return f"; did you mean {close[0]}?" if close else ""
 
 
-def _unknown_key(key: str, models: list[_Tagged]) -> str:
+def _unknown_key(key: str, models: list[Tagged]) -> str:
     allowed = list(dict.fromkeys(name for model, _ in models for name in model.model_fields))
     return f"unknown key{_closest(key, allowed)}; allowed: {', '.join(allowed)}"
 
 
-def _missing_kind(models: list[_Tagged]) -> str:
-    return f"required key is missing; must be {' or '.join(repr(_kind(model)) for model, _ in models)}"
+def _missing_kind(models: list[Tagged]) -> str:
+    return f"required key is missing; must be {' or '.join(repr(kind_of(model)) for model, _ in models)}"
 
 
 def _steps(loc: Keys, data: Any) -> Iterator[tuple[str | int, bool]]:
@@ -157,29 +157,13 @@ def _data_path(loc: Keys, data: Any, *, ends_in_key: bool) -> Keys:
     return (*path, loc[-1]) if ends_in_key and steps[-1][1] else path
 
 
-def _models_at(loc: Keys, data: Any, model: type[BaseModel]) -> list[_Tagged]:
+def _models_at(loc: Keys, data: Any, model: type[BaseModel]) -> list[Tagged]:
     """Return the model, or the members of the union, that stands at a location."""
-    models: list[_Tagged] = [(model, "")]
+    models: list[Tagged] = [(model, "")]
     for step, is_tag in _steps(loc, data):
         if is_tag:
-            models = [m for m in models if step in (m[1], _kind(m[0]))] or models
+            models = [m for m in models if step in (m[1], kind_of(m[0]))] or models
         elif isinstance(step, str):
             fields = [m.model_fields[step] for m, _ in models if step in m.model_fields]
-            models = [found for field in fields for found in _models_in(field.annotation)]
+            models = [found for field in fields for found in models_in(field.annotation)]
     return models
-
-
-def _kind(model: type[BaseModel]) -> str:
-    field = model.model_fields.get("kind")
-    return str(get_args(field.annotation)[0]) if field and get_args(field.annotation) else ""
-
-
-def _models_in(annotation: Any, tag: str = "") -> Iterator[_Tagged]:
-    """Yield the models named anywhere in an annotation, each with its union tag."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation, tag
-        return
-    parts = get_args(annotation)
-    tag = next((part.tag for part in parts if isinstance(part, Tag)), tag)
-    for part in parts:
-        yield from _models_in(part, tag)

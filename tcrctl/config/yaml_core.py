@@ -8,21 +8,19 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from typing import Any, TypeAlias
+from typing import Any
 
 import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from yaml.reader import Reader
 
+from tcrctl.config.keys import Keys, dotted
 from tcrctl.errors import Problem, SpecError
 
 try:
     from yaml import CSafeLoader as _BaseLoader
 except ImportError:  # PyYAML built without libyaml
     from yaml import SafeLoader as _BaseLoader  # type: ignore[assignment]
-
-Keys: TypeAlias = tuple[str | int, ...]
-"""Keys and list indices from the top of a document to one of its values."""
 
 MAX_DEPTH = 100  # a file nested deeper is a mistake or an attack, and would exhaust the stack
 
@@ -147,7 +145,7 @@ class Builder:
         return self._done[id(node)]
 
     def _refuse(self, node: Node, path: Keys, message: str, *, is_key: bool = False) -> None:
-        problem = Problem(position(self.name, node.start_mark), ".".join(map(str, path)), message)
+        problem = Problem(position(self.name, node.start_mark), dotted(path), message)
         self.broken.append((None if is_key else path, problem))
 
     def _value(self, node: Node, path: Keys) -> Any:

@@ -26,9 +26,8 @@ from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.emulators.plc_faults import FAULTS
 from tcr_hardware.modbus.registers import Status
 from tcrctl.config import strict_yaml
-from tcrctl.config.settings import Path as Keys
+from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.settings import Settings, quantity, refuse
-from tcrctl.errors import Problem, SpecError
 
 _DEFAULTS = MotiveFaults()
 _CHANGES = {"version": "", "renamed": False}
@@ -66,7 +65,7 @@ class Fault(Settings):
         return what.strip()
 
 
-def _unknown(fault: Fault) -> Iterator[tuple[Keys, str]]:
+def _unknown(fault: Fault) -> Iterator[Finding]:
     if (fault.cameras is None) == (fault.plc is None):
         yield (), "must say what is wrong: either cameras or plc"
     for name, value in fault.cameras.items() if isinstance(fault.cameras, dict) else ():
@@ -154,19 +153,17 @@ def load_fault_script(
     """
     document = strict_yaml.load(path)
     script = strict_yaml.validate(document, FaultScript)
-    problems = [
-        Problem(document.where(keys), ".".join(map(str, keys)), message)
+    document.refuse(
+        finding
         for i, fault in enumerate(script.faults)
-        for keys, message in _strangers(fault, ("faults", i), robots, markers)
-    ]
-    if problems:
-        raise SpecError(problems)
+        for finding in _strangers(fault, ("faults", i), robots, markers)
+    )
     return script
 
 
 def _strangers(
     fault: Fault, at: Keys, robots: Collection[str] | None, markers: Collection[str] | None
-) -> Iterator[tuple[Keys, str]]:
+) -> Iterator[Finding]:
     """Names in a fault that nobody on the rig has."""
     if robots is not None and fault.robot is not None and fault.robot not in robots:
         yield (*at, "robot"), f"there is no robot {fault.robot} on the rig; there are {', '.join(robots)}"

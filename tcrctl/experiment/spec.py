@@ -14,8 +14,8 @@ from typing import Annotated, Final, Literal
 from pydantic import Field, model_validator
 
 from tcrctl.config import shipped, strict_yaml
+from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.kind_switch import without_former_keys
-from tcrctl.config.settings import Path as Keys
 from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.controller.settings import ControllerSettings, IocSettings
 from tcrctl.errors import InputError, Problem, SpecError
@@ -110,7 +110,7 @@ class ExperimentSpec(Settings):
         return self
 
 
-def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+def _disagreements(spec: ExperimentSpec) -> Iterator[Finding]:
     results = [*UNITS, *(TASK + name for name in (spec.task.result_names if spec.task else ()))]
     for i, criterion in enumerate(spec.criteria):
         if criterion.name not in results:
@@ -131,7 +131,7 @@ def _disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
         yield ("plant", "step_ms"), f"a control period of {what}"
 
 
-def _target_disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
+def _target_disagreements(spec: ExperimentSpec) -> Iterator[Finding]:
     targets = spec.task.target_names if spec.task else ()
     for keys, name in named_targets(spec.trajectory):
         if spec.task is None:
@@ -140,7 +140,7 @@ def _target_disagreements(spec: ExperimentSpec) -> Iterator[tuple[Keys, str]]:
             yield ("trajectory", *keys), f"the task has no target {name}; it has {', '.join(targets)}"
 
 
-def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[Finding]:
     """Yield path and message of what the experiment asks and the robot does not have.
 
     Args:
@@ -158,7 +158,7 @@ def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Key
         yield ("controller", "tension", "ceiling_n"), f"must be at most {limit}, not {tension.ceiling_n:g}"
 
 
-def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[Finding]:
     legs = spec.trajectory.legs if isinstance(spec.trajectory, DrivesSettings) else ()
     given: list[tuple[Keys, tuple[float, ...]]] = [
         (("trajectory", "legs", i, "drives_mm"), leg.drives_mm) for i, leg in enumerate(legs)
@@ -224,12 +224,7 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     document, problems = _overridden(document, overrides)
     document, notes = without_former_keys(document, written, ExperimentSpec)
     spec, robot, robot_path = _validated(document, path.parent, problems)
-    problems = [
-        Problem(document.where(keys), ".".join(map(str, keys)), message)
-        for keys, message in misfits(spec, robot)
-    ]
-    if problems:
-        raise SpecError(problems)
+    document.refuse(misfits(spec, robot))
     rig = load_rig(spec.plant.rig, robot, path.parent) if isinstance(spec.plant, RigSettings) else None
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, notes)
 
@@ -265,7 +260,7 @@ def _validated(
         except SpecError as error:
             problems += error.problems
         except InputError as error:
-            problems.append(Problem(document.where(("robot",)), "robot", str(error)))
+            problems.append(document.problem(("robot",), str(error)))
     if problems or robot is None:
         raise SpecError(problems)
     return spec, robot, robot_path

@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from tcrctl.config import shipped, strict_yaml
-from tcrctl.config.settings import Path as Keys
+from tcrctl.config.keys import Finding
 from tcrctl.errors import Problem, SpecError
 from tcrctl.identify.parameters import DEFAULT_FACTOR, Parameter, look_up, split, with_values
 from tcrctl.identify.settings import DataSettings, IdentificationSpec, ParameterSettings
@@ -95,17 +95,13 @@ def from_document(
     problems: list[Problem] = []
     parameters = tuple(_parameters(spec, robot, document, problems))
     configurations, logs = _data(spec, robot, folder, document, problems)
-    problems += [_problem(document, *found) for found in _misfits(spec, configurations, logs)]
+    problems += [document.problem(*found) for found in _misfits(spec, configurations, logs)]
     if problems:
         raise SpecError(problems)
     hashed = hashlib.sha256(b"".join(strict_yaml.read(folder / entry.file) for entry in spec.data))
     return LoadedIdentification(
         spec, text, robot, robot_path, parameters, configurations, logs, hashed.hexdigest()
     )
-
-
-def _problem(document: strict_yaml.Document, keys: Keys, message: str) -> Problem:
-    return Problem(document.where(keys), ".".join(map(str, keys)), message)
 
 
 def _parameters(
@@ -119,7 +115,7 @@ def _parameters(
                 raise ValueError(f"{path} is a whole number; only real numbers can be identified")
             yield _bounded(path, start, settings, robot)
         except ValueError as error:
-            problems.append(_problem(document, ("parameters", path), str(error)))
+            problems.append(document.problem(("parameters", path), str(error)))
 
 
 def _field_value(robot: RobotDescription, path: str) -> object:
@@ -160,7 +156,7 @@ def _data(
     for i, entry in enumerate(spec.data):
         path = folder / Path(entry.file).expanduser()
         if not path.is_file():
-            problems.append(_problem(document, ("data", i, "file"), f"{path}: there is no such file"))
+            problems.append(document.problem(("data", i, "file"), f"{path}: there is no such file"))
         elif path.suffix.lower() == LOG_SUFFIX:
             logs.append(LogSource(path, entry))
         else:
@@ -173,7 +169,7 @@ def _data(
 
 def _misfits(
     spec: IdentificationSpec, static: Sequence[Configuration], logs: Sequence[LogSource]
-) -> Iterator[tuple[Keys, str]]:
+) -> Iterator[Finding]:
     names = [configuration.name for configuration in static]
     for name in sorted({name for name in names if names.count(name) > 1}):
         yield ("data",), f"two files have a configuration {name!r}"
@@ -183,9 +179,7 @@ def _misfits(
         yield from _reference_misfits(spec, static)
 
 
-def _reference_misfits(
-    spec: IdentificationSpec, static: Sequence[Configuration]
-) -> Iterator[tuple[Keys, str]]:
+def _reference_misfits(spec: IdentificationSpec, static: Sequence[Configuration]) -> Iterator[Finding]:
     found = {configuration.name: configuration for configuration in static}
     if static and spec.frame.reference not in found:
         known = ", ".join(found)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tcrctl.config.settings import Path as Keys
+from tcrctl.config.keys import Keys
 from tcrctl.robot.description import RobotDescription
 from tcrctl.signals import Array
 

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from tcrctl.config.settings import Path, Settings, quantity, refuse
+from tcrctl.config.keys import Finding
+from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.robot.sections import Name, Vector
 
 Method = Literal["pso+least-squares", "pso", "least-squares"]
@@ -27,7 +28,7 @@ class ParameterSettings(Settings):
         refuse(self._disagreements())
         return self
 
-    def _disagreements(self) -> Iterator[tuple[Path, str]]:
+    def _disagreements(self) -> Iterator[Finding]:
         if self.low is not None and self.high is not None and self.low >= self.high:
             yield ("high",), f"must be above low, {self.low:g}, not {self.high:g}"
         if self.scale == "log" and self.low is not None and self.low <= 0.0:
@@ -69,7 +70,7 @@ class FrameSettings(Settings):
         refuse(self._disagreements())
         return self
 
-    def _disagreements(self) -> Iterator[tuple[Path, str]]:
+    def _disagreements(self) -> Iterator[Finding]:
         if self.offset == "displacement" and not self.reference:
             yield ("reference",), "required with offset: displacement"
         if self.offset != "displacement" and self.reference:

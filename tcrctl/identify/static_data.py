@@ -15,9 +15,8 @@ from pathlib import Path
 from pydantic import Field, model_validator
 
 from tcrctl.config import strict_yaml
-from tcrctl.config.settings import Path as Keys
+from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.settings import Settings, quantity, refuse
-from tcrctl.errors import Problem, SpecError
 from tcrctl.identify.points import node_rows
 from tcrctl.identify.table_data import read_table
 from tcrctl.robot.description import RobotDescription, cable_routes
@@ -52,7 +51,7 @@ class StaticDataSettings(Settings):
         return self
 
 
-def _repeated(data: StaticDataSettings) -> Iterator[tuple[Keys, str]]:
+def _repeated(data: StaticDataSettings) -> Iterator[Finding]:
     names = Counter(entry.name for entry in data.configurations)
     for i, entry in enumerate(data.configurations):
         if names[entry.name] > 1:
@@ -95,18 +94,11 @@ def read_static(path: Path, robot: RobotDescription) -> tuple[Configuration, ...
     names = [route.name for route in cable_routes(robot)]
     document = read_table(path, names) if table else strict_yaml.load(path)
     data = strict_yaml.validate(document, StaticDataSettings)
-    problems = [
-        Problem(document.where(keys), ".".join(map(str, keys)), message)
-        for keys, message in _misfits(data, robot, names)
-    ]
-    if problems:
-        raise SpecError(problems)
+    document.refuse(_misfits(data, robot, names))
     return tuple(_configuration(entry, robot) for entry in data.configurations)
 
 
-def _misfits(
-    data: StaticDataSettings, robot: RobotDescription, cables: list[str]
-) -> Iterator[tuple[Keys, str]]:
+def _misfits(data: StaticDataSettings, robot: RobotDescription, cables: list[str]) -> Iterator[Finding]:
     low, high = robot.stroke_mm
     longest = max((abs(drive) for entry in data.configurations for drive in entry.drives_mm), default=0.0)
     if 0.0 < longest < (high - low) / METRES:

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tcrctl.config.strict_yaml import Document, Keys, placed, read
+from tcrctl.config.keys import Keys
+from tcrctl.config.strict_yaml import Document, placed, read
 from tcrctl.errors import Problem, SpecError
 
 _POINT = ("point", "x_mm", "y_mm", "z_mm")

@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from tcrctl.config.settings import NotNegative, OrOff, Path, Positive, Settings, Vector, quantity
+from tcrctl.config.keys import Keys
+from tcrctl.config.settings import NotNegative, OrOff, Positive, Settings, Vector, quantity
 
 
 class Mismatch(Settings):
@@ -98,7 +99,7 @@ PlantSettings: TypeAlias = Annotated[
 """Union of all kinds of plant, told apart by ``kind``."""
 
 
-def rings_named(settings: PlantSettings) -> Iterator[tuple[Path, int]]:
+def rings_named(settings: PlantSettings) -> Iterator[tuple[Keys, int]]:
     """Yield path within the section and number of every ring that the settings name."""
     if not isinstance(settings, SimulatedSettings):
         return

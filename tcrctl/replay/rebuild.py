@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from tcrctl.config import strict_yaml
-from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.errors import InputError
 from tcrctl.experiment.provenance import ROBOT
 from tcrctl.experiment.run_folder import RESOLVED, SPEC
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, misfits
@@ -77,11 +77,7 @@ def _loaded(
     log: Log, document: strict_yaml.Document, robot: RobotDescription, overrides: tuple[str, ...]
 ) -> LoadedSpec:
     spec = strict_yaml.validate(document, ExperimentSpec)
-    problems = [
-        Problem(document.where(keys), ".".join(map(str, keys)), text) for keys, text in misfits(spec, robot)
-    ]
-    if problems:
-        raise SpecError(problems)
+    document.refuse(misfits(spec, robot))
     given = log.attachments.get(SPEC, ("", b""))[1]
     place = Path(f"{log.path}:")
     return LoadedSpec(spec, robot, given, place / SPEC, place / ROBOT, overrides)

@@ -4,53 +4,65 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from tcrctl.config.settings import Path
-from tcrctl.robot.sections import CableSettings, FreeRoute, Route, SpringBetween, SpringSettings
+from tcrctl.config.keys import Finding, Keys
+from tcrctl.robot.module import module_of, node_index
+from tcrctl.robot.sections import (
+    CableSettings,
+    FreeRoute,
+    Route,
+    SpringBetween,
+    SpringSettings,
+    Stroke,
+    Tip,
+)
 
-if TYPE_CHECKING:
-    from tcrctl.robot.description import RobotDescription
 
-
-def disagreements(robot: RobotDescription) -> Iterator[tuple[Path, str]]:
-    """Yield everything in a robot description that contradicts itself."""
-    yield from _springs(robot.springs, robot.modules.count)
-    yield from _routes(robot.cables, robot.modules.count)
-    yield from _lengths_or_tensions(robot.cables)
-    if robot.tip.ring > robot.modules.count:
-        yield ("tip", "ring"), _no_ring(robot.tip.ring, robot.modules.count)
-    low, high = robot.stroke_mm
-    if not low <= 0 <= high or low == high:
-        yield ("stroke_mm",), f"must be [lowest, highest] with 0 in between, not [{low:g}, {high:g}]"
-    for i, tension in _given_tensions(robot.cables):
-        if tension > robot.tension_limit_n:
-            path: Path = (
+def cable_disagreements(cables: CableSettings, count: int, tension_limit_n: float) -> Iterator[Finding]:
+    """Yield what is wrong with the cables of a robot of so many modules."""
+    yield from _routes(cables, count)
+    yield from _lengths_or_tensions(cables)
+    for i, tension in _given_tensions(cables):
+        if tension > tension_limit_n:
+            path: Keys = (
                 ("cables", "initial_tension_n") if i < 0 else ("cables", "routes", i, "initial_tension_n")
             )
-            yield path, f"{tension:g} N is above tension_limit_n, {robot.tension_limit_n:g} N"
+            yield path, f"{tension:g} N is above tension_limit_n, {tension_limit_n:g} N"
+
+
+def tip_disagreements(tip: Tip, count: int) -> Iterator[Finding]:
+    """Yield what is wrong with the tip of a robot of so many modules."""
+    if tip.ring > count:
+        yield ("tip", "ring"), _no_ring(tip.ring, count)
+
+
+def stroke_disagreements(stroke_mm: Stroke) -> Iterator[Finding]:
+    """Yield what is wrong with the limits of the drive lengths."""
+    low, high = stroke_mm
+    if not low <= 0 <= high or low == high:
+        yield ("stroke_mm",), f"must be [lowest, highest] with 0 in between, not [{low:g}, {high:g}]"
 
 
 def _no_ring(ring: int, count: int) -> str:
     return f"there is no ring {ring}; rings are 0 (base) to {count}"
 
 
-def _springs(springs: SpringSettings, count: int) -> Iterator[tuple[Path, str]]:
+def spring_disagreements(springs: SpringSettings, count: int) -> Iterator[Finding]:
+    """Yield what is wrong with the springs of a robot of so many modules."""
     seen: set[frozenset[str]] = set()
     for i, pair in enumerate(springs.joint):
         yield from _pair(("springs", "joint", i), pair, seen)
     seen.clear()
     for i, entry in enumerate(springs.between):
-        path: Path = ("springs", "between", i)
+        path: Keys = ("springs", "between", i)
         nodes = entry.nodes if isinstance(entry, SpringBetween) else entry
         yield from _pair(path, nodes, seen)
         for node in nodes:
-            module = node.split(".")[0]
-            if module != "base" and int(module[1:]) > count:
+            if module_of(node_index(node)) > count:
                 yield path, f"there is no node {node}; modules are base, m1 to m{count}"
 
 
-def _pair(path: Path, nodes: tuple[str, str], seen: set[frozenset[str]]) -> Iterator[tuple[Path, str]]:
+def _pair(path: Keys, nodes: tuple[str, str], seen: set[frozenset[str]]) -> Iterator[Finding]:
     if nodes[0] == nodes[1]:
         yield path, f"joins {nodes[0]} with itself"
     if frozenset(nodes) in seen:
@@ -58,10 +70,10 @@ def _pair(path: Path, nodes: tuple[str, str], seen: set[frozenset[str]]) -> Iter
     seen.add(frozenset(nodes))
 
 
-def _routes(cables: CableSettings, count: int) -> Iterator[tuple[Path, str]]:
+def _routes(cables: CableSettings, count: int) -> Iterator[Finding]:
     names = Counter(route.name for route in cables.routes)
     for i, route in enumerate(cables.routes):
-        path: Path = ("cables", "routes", i)
+        path: Keys = ("cables", "routes", i)
         if names[route.name] > 1:
             yield (*path, "name"), f"the name {route.name!r} is used {names[route.name]} times"
         if isinstance(route, FreeRoute):
@@ -70,7 +82,7 @@ def _routes(cables: CableSettings, count: int) -> Iterator[tuple[Path, str]]:
             yield (*path, "to_ring"), _no_ring(route.to_ring, count)
 
 
-def _through(path: Path, route: FreeRoute, count: int) -> Iterator[tuple[Path, str]]:
+def _through(path: Keys, route: FreeRoute, count: int) -> Iterator[Finding]:
     if route.through[0].ring != 0:
         yield (*path, 0, "ring"), f"a cable begins at ring 0 (base), not at ring {route.through[0].ring}"
     for i, hole in enumerate(route.through):
@@ -80,7 +92,7 @@ def _through(path: Path, route: FreeRoute, count: int) -> Iterator[tuple[Path, s
             yield (*path, i), "the same hole twice in a row"
 
 
-def _lengths_or_tensions(cables: CableSettings) -> Iterator[tuple[Path, str]]:
+def _lengths_or_tensions(cables: CableSettings) -> Iterator[Finding]:
     """Either every cable is given by a tension or every cable by a rest length."""
     by_length = any(route.rest_length_mm is not None for route in cables.routes)
     for i, route in enumerate(cables.routes):

@@ -6,15 +6,16 @@ YAML -> RobotDescription -> spring_list, cable_routes -> robot.model
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import Field, model_validator
 
 from tcrctl.config import shipped, strict_yaml
+from tcrctl.config.keys import Finding
 from tcrctl.config.settings import Settings, quantity, refuse
-from tcrctl.robot.checks import disagreements
+from tcrctl.robot import checks
 from tcrctl.robot.sections import (
     CableSettings,
     FreeRoute,
@@ -45,8 +46,15 @@ class RobotDescription(Settings):
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> RobotDescription:
-        refuse(disagreements(self))
+        refuse(self._disagreements())
         return self
+
+    def _disagreements(self) -> Iterator[Finding]:
+        count = self.modules.count
+        yield from checks.spring_disagreements(self.springs, count)
+        yield from checks.cable_disagreements(self.cables, count, self.tension_limit_n)
+        yield from checks.tip_disagreements(self.tip, count)
+        yield from checks.stroke_disagreements(self.stroke_mm)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,8 @@ from typing import Annotated, Final, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, model_validator
 
-from tcrctl.config.settings import Path, Settings, quantity, refuse
+from tcrctl.config.keys import Finding
+from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.trajectory.values import NotNegative, Positive, Vector, not_empty
 
 #: How far markers may lie off the symmetry that the pose is computed from [mm].
@@ -160,7 +161,7 @@ class BoxSettings(Settings):
         first, second = (size for axis, size in enumerate(self.size_mm) if axis != across)
         return first, second
 
-    def _misfits(self) -> Iterator[tuple[Path, str]]:
+    def _misfits(self) -> Iterator[Finding]:
         for i, hole in enumerate(self.holes):
             for side, centre in zip(self.sides_mm(hole.wall), hole.center_mm, strict=True):
                 if abs(centre) + hole.diameter_mm / 2.0 >= side / 2.0:
@@ -236,7 +237,7 @@ def _inside(item: ObjectSettings, size_mm: Vector) -> bool:
     return r <= x <= depth - r and abs(y) <= width / 2.0 - r and abs(z) <= height / 2.0 - r
 
 
-def _repeated(key: str, names: Sequence[str]) -> Iterator[tuple[Path, str]]:
+def _repeated(key: str, names: Sequence[str]) -> Iterator[Finding]:
     seen = Counter[str]()
     for i, name in enumerate(names):
         seen[name] += 1

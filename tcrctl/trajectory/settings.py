@@ -8,7 +8,8 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from tcrctl.config.settings import Path, Settings, quantity
+from tcrctl.config.keys import Keys
+from tcrctl.config.settings import Settings, quantity
 from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.pose_settings import PlaceSettings, RevolutionSettings, ScanSettings, WaypointsSettings
 from tcrctl.trajectory.values import NotNegative, Positive, Vector, check_one_of, not_empty
@@ -173,10 +174,10 @@ TrajectorySettings: TypeAlias = Annotated[
 ]
 
 
-def named_targets(settings: TrajectorySettings) -> Iterator[tuple[Path, str]]:
+def named_targets(settings: TrajectorySettings) -> Iterator[tuple[Keys, str]]:
     """Yield path and name of every target that a ``trajectory:`` section asks for."""
     if isinstance(settings, ScanSettings):
-        places: list[tuple[Path, PlaceSettings]] = [(("hole",), settings.hole)]
+        places: list[tuple[Keys, PlaceSettings]] = [(("hole",), settings.hole)]
     elif isinstance(settings, WaypointsSettings):
         places = [(("points", i), point) for i, point in enumerate(settings.points)]
     else:

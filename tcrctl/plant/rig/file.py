@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tcrctl.config import shipped, strict_yaml
-from tcrctl.config.strict_yaml import Document, Keys
-from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.config.keys import Finding, Keys
+from tcrctl.config.strict_yaml import Document
+from tcrctl.errors import InputError
 from tcrctl.plant.rig.settings import MountedRobot, RigFile
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.module import is_ring_node, module_of, node_index
@@ -70,16 +71,11 @@ def load_rig(name_or_path: str, robot: RobotDescription, folder: Path | None = N
     if robot.name not in rig.robots:
         there = ", ".join(rig.robots)
         raise InputError(f"{path}: robot {robot.name} does not hang on rig {rig.name}; there hang: {there}")
-    problems = [
-        Problem(document.where(keys), ".".join(map(str, keys)), message)
-        for keys, message in _misfits(rig.robots[robot.name], robot)
-    ]
-    if problems:
-        raise SpecError(problems)
+    document.refuse(_misfits(rig.robots[robot.name], robot))
     return LoadedRig(rig, robot.name, path, given)
 
 
-def _misfits(mounted: MountedRobot, robot: RobotDescription) -> Iterator[tuple[Keys, str]]:
+def _misfits(mounted: MountedRobot, robot: RobotDescription) -> Iterator[Finding]:
     at: Keys = ("robots", robot.name)
     names = [route.name for route in cable_routes(robot)]
     low, high = robot.stroke_mm
@@ -96,7 +92,7 @@ def _misfits(mounted: MountedRobot, robot: RobotDescription) -> Iterator[tuple[K
     yield from _marker_misfits(mounted, robot.modules.count, (*at, "markers"))
 
 
-def _marker_misfits(mounted: MountedRobot, count: int, at: Keys) -> Iterator[tuple[Keys, str]]:
+def _marker_misfits(mounted: MountedRobot, count: int, at: Keys) -> Iterator[Finding]:
     rings = mounted.markers.rings
     for i, ring in enumerate(() if rings == "all" else rings):
         if ring > count:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
-from tcrctl.config.settings import Path as Keys
+from tcrctl.config.keys import Finding
 from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.plant.settings import Rings
 from tcrctl.robot.sections import Name, NodeName
@@ -166,7 +166,7 @@ class MountedRobot(Settings):
         return self
 
 
-def _contradictions(robot: MountedRobot) -> Iterator[tuple[Keys, str]]:
+def _contradictions(robot: MountedRobot) -> Iterator[Finding]:
     axes: dict[int, str] = {}
     for name, cable in robot.cables.items():
         if not cable.min_mm < cable.max_mm:
