@@ -139,8 +139,12 @@ def orientation_angles(normal: Array) -> Array:
     Returns:
         theta_x and theta_y (n, 2) [rad]; theta_x is made continuous, so that it may leave ±pi.
     """
-    x, y, z = normal.T
-    angles = np.stack([np.arctan2(-y, z), np.arctan2(x, np.hypot(y, z))], axis=1)
+    from tcrctl.numerics.rotation import (
+        angles_from_normal,
+    )  # numba is slow to import, and few figures need it
+
+    rows = np.ascontiguousarray(normal, dtype=np.float64)
+    angles: Array = np.array([angles_from_normal(row) for row in rows]).reshape(-1, 2)
     known = np.isfinite(angles[:, 0])
     angles[known, 0] = np.unwrap(angles[known, 0])
     return angles

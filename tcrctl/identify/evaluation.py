@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
-import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from multiprocessing.process import BaseProcess
 from types import TracebackType
-from typing import Final, Self
+from typing import Self
 
 import numpy as np
 
-from tcrctl.errors import DivergenceError, NoEquilibriumError, TcrctlError
+from tcrctl.errors import NoEquilibriumError
 from tcrctl.identify.problem import Problem
+from tcrctl.identify.workers import Workers, prediction
 from tcrctl.signals import Array
-
-#: How often a wait looks for signals [s].
-_LOOK: Final = 0.1
-_problem: Problem | None = None
 
 
 def available_cores() -> int:
@@ -47,12 +38,12 @@ class Evaluator:
     check: Callable[[], None]
     progress: Callable[[int], None] = lambda evaluations: None
     evaluations: int = 0
-    _pool: ProcessPoolExecutor | None = field(default=None, repr=False)
+    _workers: Workers | None = field(default=None, repr=False)
 
     def predict(self, x: Array) -> Array | None:
         """Prediction (n, 3) [m] at ``x`` of the unit cube, None if the robot has no shape there."""
         self.check()
-        found = _predict(self.problem, x)
+        found = prediction(self.problem, x)
         self.count(1)
         return found
 
@@ -60,16 +51,9 @@ class Evaluator:
         """Predictions at several points, side by side."""
         if self.jobs == 1 or len(points) == 1:
             return [self.predict(x) for x in points]
-        pool = self._started()
-        try:
-            futures = [pool.submit(_predict_in_worker, x) for x in points]
-            self._await(futures)
-            return [future.result() for future in futures]
-        except BrokenProcessPool:
-            raise TcrctlError(
-                "a worker process ended by itself; perhaps there is not enough memory",
-                hint="Try fewer workers: --jobs 1.",
-            ) from None
+        if self._workers is None:
+            self._workers = Workers(self.problem, self.jobs)
+        return self._workers.predict(points, self._done)
 
     def slopes(self, x: Array, predicted: Array) -> Array:
         """∂(prediction)/∂x (n, 3, n_parameters): analytic for statics, differences for logs.
@@ -99,23 +83,9 @@ class Evaluator:
         self.evaluations += number
         self.progress(self.evaluations)
 
-    def _await(self, futures: list[Future[Array | None]]) -> None:
-        waiting = set(futures)
-        try:
-            while waiting:
-                done, waiting = wait(waiting, timeout=_LOOK)
-                self.count(len(done))
-                self.check()
-        except BaseException:
-            for future in waiting:
-                future.cancel()
-            raise
-
-    def _started(self) -> ProcessPoolExecutor:
-        if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(self.jobs, context, _begin_worker, (self.problem,))
-        return self._pool
+    def _done(self, number: int) -> None:
+        self.count(number)
+        self.check()
 
     def __enter__(self) -> Self:
         """Nothing is started yet."""
@@ -125,32 +95,5 @@ class Evaluator:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the worker processes."""
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
-
-
-def _predict(problem: Problem, x: Array) -> Array | None:
-    try:
-        return problem.predict(x)
-    except (NoEquilibriumError, DivergenceError):
-        return None
-
-
-def _begin_worker(problem: Problem) -> None:
-    """Prepare a worker: Ctrl-C is its parent's business, and it does not outlive its parent."""
-    global _problem
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    _problem = problem
-
-
-def _end_with(parent: BaseProcess) -> None:
-    parent.join()
-    os._exit(1)
-
-
-def _predict_in_worker(x: Array) -> Array | None:
-    assert _problem is not None
-    return _predict(_problem, x)
+        if self._workers is not None:
+            self._workers.close()
