@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import itertools
-import json
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from tcrctl.config import strict_yaml
-from tcrctl.errors import SpecError
-from tcrctl.experiment.provenance import ROBOT, VERSIONS
-from tcrctl.experiment.run_folder import RESOLVED
+from tcrctl.errors import TcrctlError
 from tcrctl.log.comparison import Comparison, Deviation, Difference, quantities
+from tcrctl.log.file_names import RESOLVED, ROBOT
 from tcrctl.log.reader import Log, read_log
+from tcrctl.log.run_files import RunFiles
 from tcrctl.signals import StepRecord
 
 #: Durations are never the same twice.
@@ -131,16 +129,16 @@ def _unequal(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Entry, ...]:
 
 def _settings(log: Log) -> dict[str, Any]:
     """Settings by dotted key: those of the experiment as it ran, and those of the robot after its file's name."""
-    experiment, robot = _document(log, RESOLVED), _document(log, ROBOT)
+    files = RunFiles(log)
+    experiment, robot = _content(files, RESOLVED), _content(files, ROBOT)
     return {**dict(_flat(experiment)), **{f"{ROBOT}: {key}": value for key, value in _flat(robot)}}
 
 
-def _document(log: Log, name: str) -> Any:
-    text = log.attachments.get(name, ("", b""))[1]
+def _content(files: RunFiles, name: str) -> Any:
     try:
-        return strict_yaml.loads(text, f"{log.path}:{name}").data
-    except SpecError:  # not YAML: then it differs from any other text
-        return {"text": text.decode(errors="replace")}
+        return files.document(name).data
+    except TcrctlError:  # missing, or not YAML: then it differs from any other text
+        return {"text": files.content(name).decode(errors="replace")}
 
 
 def _flat(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -155,9 +153,5 @@ def _flat(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
 
 def _provenance(log: Log) -> dict[str, Any]:
     """Start record, outcome and versions by name."""
-    try:
-        versions = json.loads(log.attachments.get(VERSIONS, ("", b"{}"))[1])
-    except ValueError:
-        versions = {}
     outcome = {f"stop.{name}": (log.stop or {}).get(name, "") for name in ("status", "reason")}
-    return {**log.start, **outcome, **(versions if isinstance(versions, dict) else {})}
+    return {**log.start, **outcome, **RunFiles(log).versions()}

@@ -15,11 +15,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.config import strict_yaml
-from tcrctl.errors import InputError, TcrctlError
-from tcrctl.experiment.provenance import ROBOT
-from tcrctl.experiment.run_folder import RESOLVED, log_in
+from tcrctl.errors import InputError
+from tcrctl.experiment.run_folder import log_in
+from tcrctl.log.file_names import RESOLVED, ROBOT
 from tcrctl.log.reader import Log, read_log
+from tcrctl.log.run_files import RunFiles
 from tcrctl.robot.module import SIZE
 from tcrctl.signals import Array
 
@@ -139,9 +139,8 @@ def orientation_angles(normal: Array) -> Array:
     Returns:
         theta_x and theta_y (n, 2) [rad]; theta_x is made continuous, so that it may leave ±pi.
     """
-    from tcrctl.numerics.rotation import (
-        angles_from_normal,
-    )  # numba is slow to import, and few figures need it
+    # numba is slow to import, and few figures need it
+    from tcrctl.numerics.rotation import angles_from_normal
 
     rows = np.ascontiguousarray(normal, dtype=np.float64)
     angles: Array = np.array([angles_from_normal(row) for row in rows]).reshape(-1, 2)
@@ -244,7 +243,8 @@ def _shapes(q: NDArray[Any]) -> tuple[NDArray[np.int64], Array]:
 
 def _limits(log: Log) -> Limits:
     """Read the limits in the attached files; a file of another version may lack any of them."""
-    spec, robot = attached(log, RESOLVED), attached(log, ROBOT)
+    files = RunFiles(log)
+    spec, robot = files.data(RESOLVED), files.data(ROBOT)
     stroke = [_number(robot, "stroke_mm", end, scale=1e-3) for end in (0, 1)]
     low, high = stroke
     return Limits(
@@ -254,15 +254,6 @@ def _limits(log: Log) -> Limits:
         floor=_number(spec, "controller", "tension", "floor_n"),
         ceiling=_number(spec, "controller", "tension", "ceiling_n"),
     )
-
-
-def attached(log: Log, name: str) -> Any:
-    """Content of an attached YAML file; None if it is not there or cannot be read."""
-    _, text = log.attachments.get(name, ("", b""))
-    try:
-        return strict_yaml.loads(text, name).data
-    except TcrctlError:
-        return None
 
 
 def _number(data: Any, *path: str | int, scale: float = 1.0) -> float | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections import Counter
 from dataclasses import asdict, dataclass
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.log.reader import read_log
+from tcrctl.log.run_files import RunFiles, json_map
 
 _BUSY = ("timing_read", "timing_estimate", "timing_control", "timing_write")
 _COLUMNS = ("k", "t", "period", *_BUSY, "timing_lateness", "info_converged")
@@ -118,8 +118,8 @@ def inspect(path: str | os.PathLike[str]) -> LogInfo:
         events=dict(Counter(event.level for event in log.events())),
         attachments=list(log.attachments),
         start=log.start,
-        versions=_json_map(log.attachments.get("versions.json", ("", b"{}"))[1]),
-        summary=_json_map((log.stop or {}).get("summary", "{}")),
+        versions=RunFiles(log).versions(),
+        summary=json_map((log.stop or {}).get("summary", "{}")),
     )
 
 
@@ -163,12 +163,3 @@ def _spread(seconds: NDArray[np.float64]) -> Spread | None:
         return None
     median, high, most = (1e3 * np.quantile(known, [0.5, 0.99, 1.0])).tolist()
     return Spread(median, high, most)
-
-
-def _json_map(text: str | bytes) -> dict[str, Any]:
-    """Map that a text holds as JSON; empty if it is something else."""
-    try:
-        found = json.loads(text)
-    except ValueError:
-        return {}
-    return found if isinstance(found, dict) else {}

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.config import strict_yaml
 from tcrctl.elements.torus import point_weights
-from tcrctl.errors import TcrctlError
-from tcrctl.experiment.provenance import ROBOT
 from tcrctl.log.geometry import CableRoute
 from tcrctl.log.reader import Log
-from tcrctl.robot.description import RobotDescription, cable_routes, spring_list
+from tcrctl.log.run_files import RunFiles
+from tcrctl.robot.description import cable_routes, spring_list
 from tcrctl.robot.module import node_count, node_index, ring_nodes
 
 
@@ -45,12 +43,8 @@ def read_skeleton(log: Log, n_nodes: int) -> Skeleton | None:
         None if the log carries no robot file, or one that this version does not understand or that is not that
         of its shapes: a picture without springs and cables is better than none.
     """
-    _, text = log.attachments.get(ROBOT, ("", b""))
-    try:
-        robot = strict_yaml.validate(strict_yaml.loads(text, ROBOT), RobotDescription)
-    except TcrctlError:
-        return None
-    if node_count(robot.modules.count) != n_nodes:
+    robot = RunFiles(log).robot_if_known()
+    if robot is None or node_count(robot.modules.count) != n_nodes:
         return None
     springs = spring_list(robot)
     ends = [[node_index(name) for name in spring.nodes] for spring in springs]

@@ -16,12 +16,9 @@ from typing import Final
 
 from tcrctl import __version__
 from tcrctl.config import strict_yaml
-from tcrctl.experiment.run_folder import RESOLVED, SPEC
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
+from tcrctl.log.file_names import RESOLVED, RIG, ROBOT, SPEC, VERSIONS
 
-ROBOT: Final = "robot.yaml"
-RIG: Final = "rig.yaml"
-VERSIONS: Final = "versions.json"
 _PACKAGES: Final = (
     "foxglove-schemas-protobuf", "llvmlite", "mcap", "numba", "numpy", "protobuf", "pydantic", "pyyaml", "scipy",
 )  # fmt: skip

@@ -22,14 +22,13 @@ from tcrctl.experiment.prepare import Experiment, Notify, Parts, build_parts, bu
 from tcrctl.experiment.provenance import attachments, resolved_text, start_metadata
 from tcrctl.experiment.run_folder import (
     LOG,
-    RESOLVED,
-    SPEC,
     SUMMARY,
     RunFolder,
     check_writable,
     make_run_folder,
 )
 from tcrctl.experiment.summary import Summary, Verdict, judge
+from tcrctl.log.file_names import RESOLVED, SPEC
 from tcrctl.log.geometry import CableRoute, LogGeometry
 from tcrctl.log.mcap_file import Tap
 from tcrctl.log.writer import LogWriter

@@ -13,8 +13,6 @@ from typing import Final
 from tcrctl.errors import DeviceError
 
 LOG: Final = "log.mcap"
-SPEC: Final = "spec.yaml"
-RESOLVED: Final = "spec.resolved.yaml"
 SUMMARY: Final = "summary.json"
 _TRIES: Final = 20
 

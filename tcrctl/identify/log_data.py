@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError
-from tcrctl.experiment.provenance import ROBOT
 from tcrctl.identify.loading import LogSource
 from tcrctl.identify.points import node_rows
+from tcrctl.log.file_names import ROBOT
 from tcrctl.log.reader import Log, read_log
+from tcrctl.log.run_files import RunFiles
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.module import module_count
 from tcrctl.robot.robot import build_robot
@@ -105,8 +105,8 @@ def _shown(value: object) -> str:
 
 def _kept_lengths(log: Log) -> Array | None:
     """Rest lengths of the robot in the log if its plant was simulated."""
-    if log.start.get("plant") != "simulated" or ROBOT not in log.attachments:
+    files = RunFiles(log)
+    if log.start.get("plant") != "simulated" or ROBOT not in files:
         return None
-    document = strict_yaml.loads(log.attachments[ROBOT][1], f"{log.path}:{ROBOT}")
-    rest: Array = build_robot(strict_yaml.validate(document, RobotDescription)).model.cables[:, 0].copy()
+    rest: Array = build_robot(files.robot()).model.cables[:, 0].copy()
     return rest

@@ -6,12 +6,13 @@ import json
 from pathlib import Path
 
 from tcrctl.config import strict_yaml
-from tcrctl.experiment.provenance import ROBOT, versions
-from tcrctl.experiment.run_folder import RESOLVED, SPEC, make_run_folder
+from tcrctl.experiment.provenance import versions
+from tcrctl.experiment.run_folder import make_run_folder
 from tcrctl.identify.figure import save_figure
 from tcrctl.identify.loading import LoadedIdentification
 from tcrctl.identify.result import Result
 from tcrctl.identify.robot_file import robot_text
+from tcrctl.log.file_names import RESOLVED, ROBOT, SPEC
 
 REPORT = "report.json"
 FIGURE = "figure.png"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 
-from tcrctl.experiment.provenance import VERSIONS, versions
+from tcrctl.experiment.provenance import versions
 from tcrctl.log.reader import Log
+from tcrctl.log.run_files import RunFiles
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +29,7 @@ class Change:
 
 def changes(log: Log) -> tuple[Change, ...]:
     """Compare the versions attached to a log with those of this process, by name."""
-    try:
-        recorded = json.loads(log.attachments.get(VERSIONS, ("", b"{}"))[1])
-    except ValueError:
-        recorded = {}
-    was = recorded if isinstance(recorded, dict) else {}
-    now = versions()
+    was, now = RunFiles(log).versions(), versions()
     return tuple(
         Change(name, str(was.get(name, "")), now.get(name, ""))
         for name in dict.fromkeys((*was, *now))

@@ -9,10 +9,10 @@ from typing import Final
 
 from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError
-from tcrctl.experiment.provenance import ROBOT
-from tcrctl.experiment.run_folder import RESOLVED, SPEC
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, misfits
+from tcrctl.log.file_names import RESOLVED, ROBOT, SPEC
 from tcrctl.log.reader import Log
+from tcrctl.log.run_files import RunFiles
 from tcrctl.robot.description import RobotDescription
 
 #: Sections that a replay can change: the others made what was recorded.
@@ -45,13 +45,18 @@ def rebuild(log: Log, overrides: Sequence[str]) -> Origin:
     """
     for assignment in overrides:
         _check_changeable(assignment)
-    name = f"{log.path}:{ROBOT}"
-    robot = strict_yaml.validate(strict_yaml.loads(_attached(log, ROBOT), name), RobotDescription)
-    document = strict_yaml.loads(_attached(log, RESOLVED), f"{log.path}:{RESOLVED}")
-    recorded = _loaded(log, document, robot, ())
+    files = RunFiles(log)
+    for name in (ROBOT, RESOLVED):
+        if name not in files:
+            has = ", ".join(files.names) or "none"
+            raise InputError(
+                f"{log.path}: cannot be replayed: it has no attachment {name}; attachments: {has}"
+            )
+    robot, document = files.robot(), files.document(RESOLVED)
+    recorded = _loaded(files, document, robot, ())
     for assignment in overrides:
         document = strict_yaml.override(document, assignment)
-    wanted = _loaded(log, document, robot, tuple(overrides)) if overrides else recorded
+    wanted = _loaded(files, document, robot, tuple(overrides)) if overrides else recorded
     if wanted.spec.controller.period_s != recorded.spec.controller.period_s:
         raise InputError("--set controller.period_s: a replay has the period with which was recorded")
     return Origin(recorded, wanted)
@@ -66,18 +71,10 @@ def _check_changeable(assignment: str) -> None:
         )
 
 
-def _attached(log: Log, name: str) -> bytes:
-    if name not in log.attachments:
-        has = ", ".join(log.attachments) or "none"
-        raise InputError(f"{log.path}: cannot be replayed: it has no attachment {name}; attachments: {has}")
-    return log.attachments[name][1]
-
-
 def _loaded(
-    log: Log, document: strict_yaml.Document, robot: RobotDescription, overrides: tuple[str, ...]
+    files: RunFiles, document: strict_yaml.Document, robot: RobotDescription, overrides: tuple[str, ...]
 ) -> LoadedSpec:
     spec = strict_yaml.validate(document, ExperimentSpec)
     document.refuse(misfits(spec, robot))
-    given = log.attachments.get(SPEC, ("", b""))[1]
-    place = Path(f"{log.path}:")
-    return LoadedSpec(spec, robot, given, place / SPEC, place / ROBOT, overrides)
+    place = Path(files.place(""))
+    return LoadedSpec(spec, robot, files.content(SPEC), place / SPEC, place / ROBOT, overrides)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from tcrctl.experiment.provenance import VERSIONS, resolved_text, versions
+from tcrctl.experiment.provenance import resolved_text, versions
 from tcrctl.experiment.run import log_geometry
-from tcrctl.experiment.run_folder import RESOLVED
+from tcrctl.log.file_names import RESOLVED, VERSIONS
 from tcrctl.log.reader import Log
 from tcrctl.log.writer import LogWriter
 from tcrctl.replay.rebuild import Origin

@@ -12,6 +12,7 @@ from typing import Any, Final
 from tcrctl import __version__
 from tcrctl.analysis.history import History
 from tcrctl.experiment.summary import UNITS
+from tcrctl.log.run_files import RunFiles
 
 _SCRIPTS: Final = ("data.js", "robot.js", "charts.js", "page.js")
 _STATUS: Final = {"success": "good", "failed": "bad", "aborted": "bad", "error": "bad"}
@@ -132,11 +133,7 @@ def _pairs(values: Mapping[str, str]) -> str:
 
 def _attachments(history: History) -> str:
     """Every attached file that is text."""
-    parts = []
-    for name, (_, data) in history.log.attachments.items():
-        try:
-            text = data.decode("utf-8")
-        except UnicodeDecodeError:
-            continue
-        parts.append(f"<details><summary>{escape(name)}</summary><pre>{escape(text)}</pre></details>")
-    return "".join(parts)
+    return "".join(
+        f"<details><summary>{escape(name)}</summary><pre>{escape(text)}</pre></details>"
+        for name, text in RunFiles(history.log).texts()
+    )

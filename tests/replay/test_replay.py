@@ -17,9 +17,9 @@ from tcrctl.cli.app import main
 from tcrctl.errors import InputError, LogError
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import log_geometry, run_experiment
-from tcrctl.experiment.run_folder import RESOLVED
 from tcrctl.experiment.spec import load_spec
 from tcrctl.log.comparison import Comparison, Difference, quantities
+from tcrctl.log.file_names import RESOLVED
 from tcrctl.log.reader import read_log
 from tcrctl.log.recover import recover
 from tcrctl.log.writer import LogWriter

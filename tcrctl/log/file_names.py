@@ -1,0 +1,11 @@
+"""Names of the files that a run leaves in its log; see :mod:`tcrctl.log.run_files`."""
+
+from __future__ import annotations
+
+from typing import Final
+
+SPEC: Final = "spec.yaml"
+RESOLVED: Final = "spec.resolved.yaml"
+ROBOT: Final = "robot.yaml"
+RIG: Final = "rig.yaml"
+VERSIONS: Final = "versions.json"
