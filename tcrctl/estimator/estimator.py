@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Protocol
 
-from tcrctl.errors import InputError
-from tcrctl.estimator.exact import ExactState, State
-from tcrctl.estimator.passive_observer import PassiveObserver
-from tcrctl.estimator.settings import EstimatorSettings, ExactSettings
+from tcrctl.config.settings import Settings
+from tcrctl.estimator.exact import State, build_exact
+from tcrctl.estimator.passive_observer import build_observer
+from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
 from tcrctl.memory import Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Command, Estimate, Measurement
@@ -26,6 +26,15 @@ class Estimator(Protocol):
         ...
 
 
+Builder = Callable[[Any, Robot, float, State | None], Estimator]
+
+#: Section and builder of every ``estimator.kind``.
+KINDS: Final[Mapping[str, tuple[type[Settings], Builder]]] = {
+    "passive_observer": (PassiveObserverSettings, build_observer),
+    "exact": (ExactSettings, build_exact),
+}
+
+
 def build_estimator(
     settings: EstimatorSettings, robot: Robot, period: float, state: State | None
 ) -> Estimator:
@@ -40,8 +49,5 @@ def build_estimator(
     Raises:
         InputError: If the exact state is asked for where there is none.
     """
-    if isinstance(settings, ExactSettings):
-        if state is None:
-            raise InputError("estimator.kind: exact needs a simulated plant")
-        return ExactState(robot, state)
-    return PassiveObserver(settings, robot, period)
+    _, build = KINDS[settings.kind]
+    return build(settings, robot, period, state)

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from tcrctl.elements import sliding_cable
+from tcrctl.errors import InputError
+from tcrctl.estimator.settings import ExactSettings
 from tcrctl.memory import Kept
 from tcrctl.robot import pose
 from tcrctl.robot.robot import Robot
@@ -46,3 +48,15 @@ class ExactState:
             disturbance=np.zeros_like(q),
             converged=True,
         )
+
+
+def build_exact(settings: ExactSettings, robot: Robot, period: float, state: State | None) -> ExactState:
+    """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`.
+
+    Raises:
+        InputError: If there is no true state.
+    """
+    del settings, period
+    if state is None:
+        raise InputError("estimator.kind: exact needs a simulated plant")
+    return ExactState(robot, state)

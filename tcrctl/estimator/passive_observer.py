@@ -18,6 +18,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from tcrctl.estimator.exact import State
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.memory import NORMAL, POSITION, SPEED, Kept
 from tcrctl.robot import dynamics, pose
@@ -111,3 +112,11 @@ class PassiveObserver:
             disturbance=load.nodal[SPRING] * (load.nodal[SPRING_AT] - self._q),
             converged=outcome.converged,
         )
+
+
+def build_observer(
+    settings: PassiveObserverSettings, robot: Robot, period: float, state: State | None
+) -> PassiveObserver:
+    """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`."""
+    del state
+    return PassiveObserver(settings, robot, period)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
@@ -11,6 +11,8 @@ from tcrctl.config.settings import Settings, quantity
 
 class PassiveObserverSettings(Settings):
     """Steps the model with the applied command, drawn to the measured rings by virtual springs."""
+
+    needs_every_step: ClassVar[bool] = False
 
     kind: Literal["passive_observer"]
     stiffness_n_m: float = quantity(
@@ -26,6 +28,9 @@ class PassiveObserverSettings(Settings):
 
 class ExactSettings(Settings):
     """Passes the simulated plant's true state on; for studies on a simulated plant."""
+
+    #: The plant's state is its input, so a log from which it shall be replayed has it in every step.
+    needs_every_step: ClassVar[bool] = True
 
     kind: Literal["exact"]
 

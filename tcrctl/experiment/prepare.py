@@ -24,7 +24,7 @@ from tcrctl.loop.safety import SafetyLimits
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.rig.bench import build_rig
 from tcrctl.plant.rig.session import Session
-from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
 from tcrctl.robot.module import ring_rows
@@ -40,7 +40,7 @@ START_READS: Final = 10
 WARM_UP_STEPS: Final = 3
 
 Notify = Callable[[str], None]
-PlantBuilder = Callable[["Experiment", Session], tuple[RunnablePlant, State | None]]
+PlantBuilder = Callable[[Any, "Experiment", Session], tuple[RunnablePlant, State | None]]
 
 
 def silent(text: str) -> None:
@@ -104,23 +104,26 @@ class Parts:
     start_offset: float
 
 
-def _simulated(experiment: Experiment, session: Session) -> tuple[RunnablePlant, State]:
+def _simulated(
+    settings: SimulatedSettings, experiment: Experiment, session: Session
+) -> tuple[RunnablePlant, State]:
     del session
-    spec = experiment.spec
-    if not isinstance(spec.plant, SimulatedSettings):
-        raise InputError(f"plant.kind is {spec.plant.kind}, not simulated")
-    plant = SimulatedPlant(spec.plant, experiment.robot, experiment.period, spec.seed)
+    plant = SimulatedPlant(settings, experiment.robot, experiment.period, experiment.spec.seed)
     return plant, plant.state
 
 
-def _rig(experiment: Experiment, session: Session) -> tuple[RunnablePlant, None]:
+def _rig(settings: RigSettings, experiment: Experiment, session: Session) -> tuple[RunnablePlant, None]:
+    del settings  # the file that it names is loaded
     if experiment.loaded.rig is None:
         raise InputError("the experiment was loaded without a rig file")
     return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, session), None
 
 
-#: Plant, and its true state if it knows it, for every ``plant.kind``.
-PLANTS: Final[Mapping[str, PlantBuilder]] = {"simulated": _simulated, "rig": _rig}
+#: Section and builder of every ``plant.kind``; it returns the plant, and its true state if it knows it.
+PLANTS: Final[Mapping[str, tuple[type[PlantSection], PlantBuilder]]] = {
+    "simulated": (SimulatedSettings, _simulated),
+    "rig": (RigSettings, _rig),
+}
 
 
 def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = silent) -> Experiment:
@@ -196,7 +199,9 @@ def build_plant(experiment: Experiment, session: Session | None = None) -> tuple
         DeviceError: If it cannot be reached.
         InputError: If a rig does not do what its file says.
     """
-    return PLANTS[experiment.spec.plant.kind](experiment, session or Session())
+    settings = experiment.spec.plant
+    _, build = PLANTS[settings.kind]
+    return build(settings, experiment, session or Session())
 
 
 def build_parts(experiment: Experiment, plant: RunnablePlant, state: State | None) -> Parts:

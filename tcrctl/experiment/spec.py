@@ -14,21 +14,20 @@ from typing import Annotated, Final, Literal
 from pydantic import Field, model_validator
 
 from tcrctl.config import shipped, strict_yaml
-from tcrctl.config.keys import Finding, Keys
+from tcrctl.config.keys import Finding
 from tcrctl.config.kind_switch import without_former_keys
 from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.controller.settings import ControllerSettings, IocSettings
 from tcrctl.errors import InputError, Problem, SpecError
-from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
+from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
 from tcrctl.experiment.criterion import CriterionText
 from tcrctl.experiment.summary import TASK, UNITS
 from tcrctl.plant.rig.file import LoadedRig, load_rig
-from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings, rings_named
+from tcrctl.plant.settings import PlantSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
 from tcrctl.task.settings import TaskSettings
-from tcrctl.trajectory.drive_settings import DrivesSettings
-from tcrctl.trajectory.settings import TrajectorySettings, named_targets
+from tcrctl.trajectory.settings import TrajectorySettings
 
 #: Control rate up to which ``full_state_s: auto`` means every step [Hz].
 _RICH_RATE_HZ: Final = 20.0
@@ -101,8 +100,9 @@ class ExperimentSpec(Settings):
     @property
     def full_state_s(self) -> float:
         """Time between two steps that are logged in full [s]; an exact state is input, so every step has to be."""
-        exact = isinstance(self.estimator, ExactSettings)
-        return 0.0 if exact else self.log.full_state(self.controller.period_s)
+        if self.estimator.needs_every_step:
+            return 0.0
+        return self.log.full_state(self.controller.period_s)
 
     @model_validator(mode="after")
     def _sections_agree(self) -> ExperimentSpec:
@@ -122,18 +122,13 @@ def _disagreements(spec: ExperimentSpec) -> Iterator[Finding]:
             ("trajectory", "kind"),
             f"must be drives with controller.kind: open_loop, not {spec.trajectory.kind}",
         )
-    if not isinstance(spec.plant, SimulatedSettings):
-        return
-    step, period = spec.plant.step_ms, spec.controller.period_s
-    steps = period * 1e3 / step
-    if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
-        what = f"{period:g} s must be a whole number of steps; with {step:g} ms it is {steps:g}"
-        yield ("plant", "step_ms"), f"a control period of {what}"
+    for keys, message in spec.plant.misfits(spec.controller.period_s):
+        yield ("plant", *keys), message
 
 
 def _target_disagreements(spec: ExperimentSpec) -> Iterator[Finding]:
     targets = spec.task.target_names if spec.task else ()
-    for keys, name in named_targets(spec.trajectory):
+    for keys, name in spec.trajectory.named_targets():
         if spec.task is None:
             yield ("trajectory", *keys), f"there is no task with a target {name}; the experiment has none"
         elif name not in targets:
@@ -148,7 +143,7 @@ def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[Finding]:
         robot: Its robot.
     """
     count = robot.modules.count
-    for keys, ring in rings_named(spec.plant):
+    for keys, ring in spec.plant.rings_named():
         if ring > count:
             yield ("plant", *keys), f"there is no ring {ring}; {robot.name} has rings 1 to {count}"
     yield from _drive_misfits(spec, robot)
@@ -159,25 +154,18 @@ def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[Finding]:
 
 
 def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[Finding]:
-    legs = spec.trajectory.legs if isinstance(spec.trajectory, DrivesSettings) else ()
-    given: list[tuple[Keys, tuple[float, ...]]] = [
-        (("trajectory", "legs", i, "drives_mm"), leg.drives_mm) for i, leg in enumerate(legs)
-    ]
-    start = spec.plant.start_drives_mm if isinstance(spec.plant, SimulatedSettings) else None
-    if start is not None:
-        given.append((("plant", "start_drives_mm"), start))
+    on_the_way = [(("trajectory", *keys), lengths) for keys, lengths in spec.trajectory.drives_named()]
+    at_start = [(("plant", *keys), lengths) for keys, lengths in spec.plant.drives_named()]
     names = [route.name for route in cable_routes(robot)]
-    for keys, lengths in given:
+    for keys, lengths in (*on_the_way, *at_start):
         if len(lengths) != len(names):
             has = f"{robot.name} has {len(names)} cables, {', '.join(names)}"
             yield keys, f"{has}; there are {len(lengths)} lengths"
     low, high = robot.stroke_mm
-    for c, length in enumerate(start or ()):
-        if not low <= length <= high:
-            yield (
-                ("plant", "start_drives_mm", c),
-                f"must be within stroke_mm, {low:g} to {high:g}, not {length:g}",
-            )
+    for keys, lengths in at_start:
+        for c, length in enumerate(lengths):
+            if not low <= length <= high:
+                yield (*keys, c), f"must be within stroke_mm, {low:g} to {high:g}, not {length:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +213,8 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     document, notes = without_former_keys(document, written, ExperimentSpec)
     spec, robot, robot_path = _validated(document, path.parent, problems)
     document.refuse(misfits(spec, robot))
-    rig = load_rig(spec.plant.rig, robot, path.parent) if isinstance(spec.plant, RigSettings) else None
+    named = spec.plant.rig_file
+    rig = None if named is None else load_rig(named, robot, path.parent)
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, notes)
 
 

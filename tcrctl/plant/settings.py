@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from tcrctl.config.keys import Keys
+from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.settings import NotNegative, OrOff, Positive, Settings, Vector, quantity
 
 
@@ -64,7 +64,29 @@ class DropoutSettings(Settings):
     duration_s: Positive = quantity("s", "how long it lasts")
 
 
-class SimulatedSettings(Settings):
+class PlantSection(Settings):
+    """What every ``plant:`` section can be asked, whatever its kind."""
+
+    @property
+    def rig_file(self) -> str | None:
+        """Rig that it names, or path of its file; None if there is no bench."""
+        return None
+
+    def rings_named(self) -> Iterator[tuple[Keys, int]]:
+        """Yield place in the section and number of every ring that it names."""
+        yield from ()
+
+    def drives_named(self) -> Iterator[tuple[Keys, tuple[float, ...]]]:
+        """Yield place in the section and drive lengths [mm] wherever it gives some."""
+        yield from ()
+
+    def misfits(self, period_s: float) -> Iterator[Finding]:
+        """Yield what does not go with a control period [s]."""
+        del period_s
+        yield from ()
+
+
+class SimulatedSettings(PlantSection):
     """The robot's equations of motion, integrated by the generalized-alpha method."""
 
     kind: Literal["simulated"]
@@ -85,29 +107,43 @@ class SimulatedSettings(Settings):
     pushes: tuple[PushSettings, ...] = Field(default=(), description="forces from outside")
     dropouts: tuple[DropoutSettings, ...] = Field(default=(), description="markers that are not seen")
 
+    def rings_named(self) -> Iterator[tuple[Keys, int]]:
+        """Yield place and number of every ring that is measured, pushed or hidden by name."""
+        if self.measured_rings != "all":
+            for i, ring in enumerate(self.measured_rings):
+                yield ("measured_rings", i), ring
+        for i, push in enumerate(self.pushes):
+            yield ("pushes", i, "ring"), push.ring
+        for i, dropout in enumerate(self.dropouts):
+            for j, ring in enumerate(dropout.rings):
+                yield ("dropouts", i, "rings", j), ring
 
-class RigSettings(Settings):
+    def drives_named(self) -> Iterator[tuple[Keys, tuple[float, ...]]]:
+        """Yield the drive lengths before the run if they are given."""
+        if self.start_drives_mm is not None:
+            yield ("start_drives_mm",), self.start_drives_mm
+
+    def misfits(self, period_s: float) -> Iterator[Finding]:
+        """Yield that no whole number of steps makes a control period [s]."""
+        steps = period_s * 1e3 / self.step_ms
+        if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
+            what = f"{period_s:g} s must be a whole number of steps; with {self.step_ms:g} ms it is {steps:g}"
+            yield ("step_ms",), f"a control period of {what}"
+
+
+class RigSettings(PlantSection):
     """The real robot, measured by cameras and moved by drives; always paced by the clock."""
 
     kind: Literal["rig"]
     rig: str = Field(description="shipped rig, or path of a rig file relative to this one", min_length=1)
+
+    @property
+    def rig_file(self) -> str:
+        """The rig, as it is written."""
+        return self.rig
 
 
 PlantSettings: TypeAlias = Annotated[
     SimulatedSettings | RigSettings, Field(discriminator="kind", description="what is controlled")
 ]
 """Union of all kinds of plant, told apart by ``kind``."""
-
-
-def rings_named(settings: PlantSettings) -> Iterator[tuple[Keys, int]]:
-    """Yield path within the section and number of every ring that the settings name."""
-    if not isinstance(settings, SimulatedSettings):
-        return
-    if settings.measured_rings != "all":
-        for i, ring in enumerate(settings.measured_rings):
-            yield ("measured_rings", i), ring
-    for i, push in enumerate(settings.pushes):
-        yield ("pushes", i, "ring"), push.ring
-    for i, dropout in enumerate(settings.dropouts):
-        for j, ring in enumerate(dropout.rings):
-            yield ("dropouts", i, "rings", j), ring

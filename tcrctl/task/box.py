@@ -9,7 +9,7 @@ import numpy as np
 from tcrctl.signals import Array
 from tcrctl.task.perforated_plate import Plates
 from tcrctl.task.pipe import Seen, exactly
-from tcrctl.task.settings import WALLS, BoxHoleSettings, BoxSettings
+from tcrctl.task.settings import WALLS, BoxHoleSettings, BoxInspectionSettings, BoxSettings
 from tcrctl.trajectory.pose_path import MM, EndPose, unit
 
 
@@ -57,6 +57,12 @@ def hole_target(settings: BoxSettings, box: Box, hole: BoxHoleSettings) -> EndPo
     along, across, inward = box.walls.frame[wall]
     centre = box.walls.middle[wall] + MM * (hole.center_mm[0] * along + hole.center_mm[1] * across)
     return EndPose(centre - MM * hole.standoff_mm * inward, -inward)
+
+
+def hole_targets(settings: BoxInspectionSettings, seen: Seen) -> dict[str, EndPose]:
+    """Return the pose before every hole, by its name, from the markers of the box as they are seen."""
+    box = box_from_markers(settings.box, seen)
+    return {hole.name: hole_target(settings.box, box, hole) for hole in settings.box.holes}
 
 
 def _walls(settings: BoxSettings, origin: Array, frame: Array) -> Plates:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -10,11 +11,11 @@ import numpy as np
 from tcrctl.log.event import Event
 from tcrctl.signals import Array, StepRecord
 from tcrctl.task.body import segment_name, segments
-from tcrctl.task.box import Box
+from tcrctl.task.box import Box, box_from_markers
 from tcrctl.task.perforated_plate import blocks, nearest
 from tcrctl.task.settings import WALLS, BoxInspectionSettings
 from tcrctl.task.sight import hides, in_view
-from tcrctl.trajectory.pose_path import MM
+from tcrctl.trajectory.pose_path import MM, EndPose
 
 #: Parts of the robot farther from the walls than this are of no interest [m].
 FARTHEST: Final = 1.0
@@ -98,3 +99,11 @@ class BoxInspection:
             "collision_between": self._touch or None,
             "smallest_clearance_mm": self._clearance / MM if math.isfinite(self._clearance) else None,
         }
+
+
+def build_box_inspection(
+    settings: BoxInspectionSettings, targets: Mapping[str, EndPose], rod_diameter: float
+) -> BoxInspection:
+    """Build the task; see :class:`tcrctl.task.task.Kind`."""
+    del targets
+    return BoxInspection(settings, box_from_markers(settings.box), rod_diameter)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -13,7 +13,8 @@ from tcrctl.log.event import Event
 from tcrctl.numerics.rotation import angle_between, angles_from_normal
 from tcrctl.signals import Array, Reference, StepRecord
 from tcrctl.task import bore
-from tcrctl.task.pipe import Pipe
+from tcrctl.task.pipe import Pipe, pipe_from_markers
+from tcrctl.task.settings import LaserPipeSettings
 from tcrctl.trajectory.pose_path import MM, EndPose
 
 #: How near the reference has to be to a target for the end to be wanted there [m], [rad].
@@ -112,3 +113,12 @@ def _event(t: float, pipe: Pipe, visit: _Visit) -> Event:
         room = f"{visit.clearance / MM:.2f} mm clear of its wall"
         return Event(t, "task", "info", f"at {pipe.name}: the beam goes through, {room}")
     return Event(t, "task", "warning", f"at {pipe.name}: the beam does not go through")
+
+
+def build_laser_pipe(
+    settings: LaserPipeSettings, targets: Mapping[str, EndPose], rod_diameter: float
+) -> LaserPipe:
+    """Build the task; see :class:`tcrctl.task.task.Kind`."""
+    del rod_diameter
+    pipes = [pipe_from_markers(pipe) for pipe in settings.pipes]
+    return LaserPipe(pipes, [targets[pipe.name] for pipe in pipes], MM * settings.beam_mm / 2.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tcrctl.signals import Array
 from tcrctl.task.bore import Bore
-from tcrctl.task.settings import PipeSettings
+from tcrctl.task.settings import LaserPipeSettings, PipeSettings
 from tcrctl.trajectory.pose_path import MM, EndPose
 
 Seen = Callable[[Array], Array]
@@ -55,3 +55,8 @@ def pipe_from_markers(settings: PipeSettings, seen: Seen = exactly) -> Pipe:
         EndPose(entry - MM * settings.standoff_mm * axis, -axis),
         MM * settings.screen_mm,
     )
+
+
+def pipe_targets(settings: LaserPipeSettings, seen: Seen) -> dict[str, EndPose]:
+    """Return the pose before every pipe, by its name, from its markers as they are seen."""
+    return {pipe.name: pipe_from_markers(pipe, seen).target for pipe in settings.pipes}

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
+from tcrctl.config.settings import Settings
 from tcrctl.log.event import Event
 from tcrctl.signals import Array, StepRecord
-from tcrctl.task.box import box_from_markers, hole_target
-from tcrctl.task.box_inspection import BoxInspection
-from tcrctl.task.laser_pipe import LaserPipe
-from tcrctl.task.pipe import Seen, pipe_from_markers
+from tcrctl.task.box import hole_targets
+from tcrctl.task.box_inspection import build_box_inspection
+from tcrctl.task.laser_pipe import build_laser_pipe
+from tcrctl.task.pipe import Seen, pipe_targets
 from tcrctl.task.settings import BoxInspectionSettings, LaserPipeSettings, TaskSettings
 from tcrctl.trajectory.pose_path import MM, EndPose
 
@@ -32,6 +33,27 @@ class Task(Protocol):
         ...
 
 
+class Kind(NamedTuple):
+    """One kind of task.
+
+    Attributes:
+        settings: Its section.
+        build: Makes the task from its section, its targets and the diameter of the robot's rods [m].
+        targets: Finds the named poses from the section and how its markers are seen.
+    """
+
+    settings: type[Settings]
+    build: Callable[[Any, Mapping[str, EndPose], float], Task]
+    targets: Callable[[Any, Seen], Mapping[str, EndPose]]
+
+
+#: Every ``task.kind``.
+KINDS: Final[Mapping[str, Kind]] = {
+    "laser_pipe": Kind(LaserPipeSettings, build_laser_pipe, pipe_targets),
+    "box_inspection": Kind(BoxInspectionSettings, build_box_inspection, hole_targets),
+}
+
+
 def task_targets(settings: TaskSettings, seed: int) -> Mapping[str, EndPose]:
     """Compute the named poses that the trajectory may go to, from the markers as the cameras see them.
 
@@ -39,11 +61,8 @@ def task_targets(settings: TaskSettings, seed: int) -> Mapping[str, EndPose]:
         settings: The task.
         seed: Seed of the marker noise.
     """
-    seen = _noisy(MM * 1e-3 * settings.marker_noise_um, seed)
-    if isinstance(settings, LaserPipeSettings):
-        return {pipe.name: pipe_from_markers(pipe, seen).target for pipe in settings.pipes}
-    box = box_from_markers(settings.box, seen)
-    return {hole.name: hole_target(settings.box, box, hole) for hole in settings.box.holes}
+    kind = KINDS[settings.kind]
+    return kind.targets(settings, _noisy(MM * 1e-3 * settings.marker_noise_um, seed))
 
 
 def build_task(settings: TaskSettings, seed: int, rod_diameter: float) -> Task:
@@ -54,11 +73,7 @@ def build_task(settings: TaskSettings, seed: int, rod_diameter: float) -> Task:
         seed: Seed of the marker noise.
         rod_diameter: Diameter of the robot's rods and rings [m].
     """
-    if isinstance(settings, BoxInspectionSettings):
-        return BoxInspection(settings, box_from_markers(settings.box), rod_diameter)
-    targets = task_targets(settings, seed)
-    pipes = [pipe_from_markers(pipe) for pipe in settings.pipes]
-    return LaserPipe(pipes, [targets[pipe.name] for pipe in pipes], MM * settings.beam_mm / 2.0)
+    return KINDS[settings.kind].build(settings, task_targets(settings, seed), rod_diameter)
 
 
 def _noisy(deviation: float, seed: int) -> Seen:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from tcrctl.config.keys import Keys
 from tcrctl.config.settings import Settings, quantity
+from tcrctl.trajectory.section import TrajectorySection
 from tcrctl.trajectory.values import NotNegative, Positive, not_empty
 
 
@@ -23,8 +26,10 @@ class DriveLegSettings(Settings):
     )
 
 
-class DrivesSettings(Settings):
+class DrivesSettings(TrajectorySection):
     """Given drive lengths over time; the wanted end pose is that of the model at rest with these drives."""
+
+    gives_drives: ClassVar[bool] = True
 
     kind: Literal["drives"]
     legs: Annotated[tuple[DriveLegSettings, ...], AfterValidator(not_empty)] = Field(
@@ -40,3 +45,8 @@ class DrivesSettings(Settings):
             if count != counts[0]:
                 raise ValueError(f"leg {i} has {count} drives, but leg 1 has {counts[0]}")
         return self
+
+    def drives_named(self) -> Iterator[tuple[Keys, tuple[float, ...]]]:
+        """Yield place and drive lengths [mm] of every leg."""
+        for i, leg in enumerate(self.legs):
+            yield ("legs", i, "drives_mm"), leg.drives_mm

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from tcrctl.config.keys import Keys
 from tcrctl.config.settings import Settings, quantity
+from tcrctl.trajectory.section import Placed, TrajectorySection
 from tcrctl.trajectory.values import Direction, NotNegative, Positive, Vector, check_one_of, not_empty
 
 Span: TypeAlias = tuple[float, float]
@@ -61,8 +64,16 @@ class WaypointSettings(PlaceSettings):
         faces = self.target is not None and self.face_target
         return faces or self.normal is not None or self.theta_deg is not None
 
+    def with_target(self, poses: Mapping[str, Placed]) -> WaypointSettings:
+        """Return the waypoint at the pose of its target, if it has one."""
+        if self.target is None:
+            return self
+        place, normal = poses[self.target]
+        found = {"target": None, "position_mm": place, "normal": normal if self.face_target else None}
+        return self.model_copy(update=found)
 
-class WaypointsSettings(Settings):
+
+class WaypointsSettings(TrajectorySection):
     """From the rest pose through poses, each leg from rest to rest: straight, the normal on a great circle."""
 
     kind: Literal["waypoints"]
@@ -88,8 +99,18 @@ class WaypointsSettings(Settings):
                 raise ValueError(f"waypoint {i} has {has} orientation, but waypoint 1 {first}")
         return self
 
+    def named_targets(self) -> Iterator[tuple[Keys, str]]:
+        """Yield place and name of the target of every waypoint that has one."""
+        for i, point in enumerate(self.points):
+            if point.target is not None:
+                yield ("points", i, "target"), point.target
 
-class RevolutionSettings(Settings):
+    def with_targets(self, poses: Mapping[str, Placed]) -> Self:
+        """Return the section with every waypoint at its place."""
+        return self.model_copy(update={"points": tuple(point.with_target(poses) for point in self.points)})
+
+
+class RevolutionSettings(TrajectorySection):
     """From the rest pose to a start pose, then turning about a vertical axis, then back to rest if wanted.
 
     At the angle a the end stands at the axis + radius * (cos a, sin a) + height; radius, height and tilt change
@@ -154,7 +175,7 @@ class HoleSettings(PlaceSettings):
         return self
 
 
-class ScanSettings(Settings):
+class ScanSettings(TrajectorySection):
     """Four stages: go to a hole, tilt the normal off its axis, turn it once about the axis, tilt it back."""
 
     kind: Literal["scan"]
@@ -190,3 +211,18 @@ class ScanSettings(Settings):
         if (self.insert_mm > 0.0) != (self.insert_s > 0.0):
             raise ValueError("give both of insert_mm and insert_s, or none")
         return self
+
+    def named_targets(self) -> Iterator[tuple[Keys, str]]:
+        """Yield place and name of the target that is the hole, if it is one."""
+        if self.hole.target is not None:
+            yield ("hole", "target"), self.hole.target
+
+    def with_targets(self, poses: Mapping[str, Placed]) -> Self:
+        """Return the section with the hole at its place, the axis against the normal of the pose."""
+        if self.hole.target is None:
+            return self
+        place, normal = poses[self.hole.target]
+        assert normal is not None
+        axis = tuple(-component for component in normal)
+        hole = self.hole.model_copy(update={"target": None, "position_mm": place, "axis": axis})
+        return self.model_copy(update={"hole": hole})

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from tcrctl.config.keys import Keys
 from tcrctl.config.settings import Settings, quantity
 from tcrctl.trajectory.drive_settings import DrivesSettings
-from tcrctl.trajectory.pose_settings import PlaceSettings, RevolutionSettings, ScanSettings, WaypointsSettings
+from tcrctl.trajectory.pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
+from tcrctl.trajectory.section import TrajectorySection
 from tcrctl.trajectory.values import NotNegative, Positive, Vector, check_one_of, not_empty
 
 JOIN_TOLERANCE_MM = 1e-6
@@ -128,7 +127,7 @@ class PlaneSettings(Settings):
         return self
 
 
-class StrokesSettings(Settings):
+class StrokesSettings(TrajectorySection):
     """A drawing in a plane: strokes in order, joined by straight travel moves; position only."""
 
     kind: Literal["strokes"]
@@ -155,7 +154,7 @@ class StrokesSettings(Settings):
     settle_s: NotNegative = quantity("s", "rest at the very end, after the last dwell", 2.0)
 
 
-class HoldSettings(Settings):
+class HoldSettings(TrajectorySection):
     """Stand still at the rest pose, or beside it."""
 
     kind: Literal["hold"]
@@ -172,16 +171,4 @@ TrajectorySettings: TypeAlias = Annotated[
     StrokesSettings | HoldSettings | WaypointsSettings | RevolutionSettings | ScanSettings | DrivesSettings,
     Field(discriminator="kind"),
 ]
-
-
-def named_targets(settings: TrajectorySettings) -> Iterator[tuple[Keys, str]]:
-    """Yield path and name of every target that a ``trajectory:`` section asks for."""
-    if isinstance(settings, ScanSettings):
-        places: list[tuple[Keys, PlaceSettings]] = [(("hole",), settings.hole)]
-    elif isinstance(settings, WaypointsSettings):
-        places = [(("points", i), point) for i, point in enumerate(settings.points)]
-    else:
-        places = []
-    for path, place in places:
-        if place.target is not None:
-            yield (*path, "target"), place.target
+"""Union of all kinds of trajectory, told apart by ``kind``; see :data:`tcrctl.trajectory.trajectory.KINDS`."""

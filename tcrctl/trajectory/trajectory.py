@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Reference
+from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.drives import build_drives
 from tcrctl.trajectory.hold import build_hold
+from tcrctl.trajectory.pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
 from tcrctl.trajectory.revolution import build_revolution
 from tcrctl.trajectory.scan import build_scan
-from tcrctl.trajectory.settings import TrajectorySettings
+from tcrctl.trajectory.section import TrajectorySection
+from tcrctl.trajectory.settings import HoldSettings, StrokesSettings, TrajectorySettings
 from tcrctl.trajectory.strokes import build_strokes
 from tcrctl.trajectory.targets import Targets, with_targets
 from tcrctl.trajectory.waypoints import build_waypoints
@@ -45,14 +48,14 @@ class Driven(Protocol):
         ...
 
 
-# the settings type of each builder belongs to its key; TrajectorySettings has checked that pairing
-BUILDERS: Mapping[str, Callable[[Any, Robot], Trajectory]] = {
-    "strokes": build_strokes,
-    "hold": build_hold,
-    "waypoints": build_waypoints,
-    "revolution": build_revolution,
-    "scan": build_scan,
-    "drives": build_drives,
+#: Section and builder of every ``trajectory.kind``.
+KINDS: Final[Mapping[str, tuple[type[TrajectorySection], Callable[[Any, Robot], Trajectory]]]] = {
+    "strokes": (StrokesSettings, build_strokes),
+    "hold": (HoldSettings, build_hold),
+    "waypoints": (WaypointsSettings, build_waypoints),
+    "revolution": (RevolutionSettings, build_revolution),
+    "scan": (ScanSettings, build_scan),
+    "drives": (DrivesSettings, build_drives),
 }
 
 NO_TARGETS: Targets = {}
@@ -69,7 +72,8 @@ def build_trajectory(settings: TrajectorySettings, robot: Robot, targets: Target
     Raises:
         NoEquilibriumError: If drive lengths are given with which the robot has no stable shape.
     """
-    return BUILDERS[settings.kind](with_targets(settings, targets), robot)
+    _, build = KINDS[settings.kind]
+    return build(with_targets(settings, targets), robot)
 
 
 def sample_reference(trajectory: Trajectory, t: float, ahead_t: Array) -> Reference:

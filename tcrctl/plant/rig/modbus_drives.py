@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -20,9 +20,10 @@ from tcr_hardware.modbus.errors import (
 )
 from tcr_hardware.modbus.registers import Control, Fault, Reject, Status, register_map
 from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
+from tcrctl.config.settings import Settings
 from tcrctl.errors import DeviceError, InputError, UntrustworthyDeviceError
 from tcrctl.plant.rig.devices import DriveControl, DriveStatus
-from tcrctl.plant.rig.settings import CableDrive, ModbusTcp, MountedRobot, SafetyRules
+from tcrctl.plant.rig.settings import CableDrive, ModbusRtu, ModbusTcp, MountedRobot, SafetyRules
 
 _WRONG_FILE: Final = (MapError, PlcMismatchError, RateError)
 _HOPELESS: Final = (ImplausibleAnswerError, PlcFrozenError)
@@ -30,8 +31,14 @@ _HOPELESS: Final = (ImplausibleAnswerError, PlcFrozenError)
 
 def address(mounted: MountedRobot) -> str:
     """Return where the PLC is, for messages."""
-    plc = mounted.plc
-    return f"PLC at {plc.host}:{plc.port}" if isinstance(plc, ModbusTcp) else f"PLC at {plc.device}"
+    return f"PLC at {mounted.plc.place}"
+
+
+#: Section and link of every ``plc.kind``.
+LINKS: Final[Mapping[str, tuple[type[Settings], Callable[[Any], TcpLink | RtuLink]]]] = {
+    "modbus_tcp": (ModbusTcp, lambda plc: TcpLink(plc.host, plc.port)),
+    "modbus_rtu": (ModbusRtu, lambda plc: RtuLink(plc.device, plc.baud, plc.parity, plc.stop_bits)),
+}
 
 
 def bus_settings(mounted: MountedRobot) -> BusSettings:
@@ -41,17 +48,13 @@ def bus_settings(mounted: MountedRobot) -> BusSettings:
         InputError: If the register map of the rig file is impossible.
     """
     plc = mounted.plc
-    link = (
-        TcpLink(plc.host, plc.port)
-        if isinstance(plc, ModbusTcp)
-        else RtuLink(plc.device, plc.baud, plc.parity, plc.stop_bits)
-    )
+    _, link_to = LINKS[plc.kind]
     try:
         registers = register_map(changes=plc.map)
     except MapError as error:
         raise InputError(f"plc.map: {error}", hint=error.hint) from error
     return BusSettings(
-        link,
+        link_to(plc),
         unit=plc.unit,
         timeout_s=plc.timeout_ms / 1e3,
         retries=plc.retries,
@@ -85,7 +88,7 @@ class ModbusDrives:
         self._axes = np.array([cable.axis - 1 for cable in self._cables])
         self._signs = np.array([cable.sign for cable in self._cables], dtype=np.int64)
         self._speed = math.ceil(1e3 * max(cable.speed_limit_mm_s for cable in self._cables) / 100.0) * 100
-        self._asks = isinstance(mounted.plc, ModbusTcp)
+        self._asks = mounted.plc.prompt
         self.bus = PlcBus(bus_settings(mounted))
         try:
             self._call(self.bus.open)

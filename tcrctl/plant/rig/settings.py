@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -116,19 +116,34 @@ class _Plc(Settings):
 class ModbusTcp(_Plc):
     """A PLC on Modbus TCP."""
 
+    #: A request costs next to no time, so the status may be asked for in between.
+    prompt: ClassVar[bool] = True
+
     kind: Literal["modbus_tcp"]
     host: Host
     port: Port = 502
 
+    @property
+    def place(self) -> str:
+        """Where it is, for messages."""
+        return f"{self.host}:{self.port}"
+
 
 class ModbusRtu(_Plc):
     """A PLC on a serial line."""
+
+    prompt: ClassVar[bool] = False
 
     kind: Literal["modbus_rtu"]
     device: str = Field(min_length=1, description="for instance /dev/ttyUSB0")
     baud: int = Field(default=115200, ge=1200)
     parity: Literal["N", "E", "O"] = "N"
     stop_bits: Literal[1, 2] = 1
+
+    @property
+    def place(self) -> str:
+        """Where it is, for messages."""
+        return self.device
 
 
 class CableDrive(Settings):
