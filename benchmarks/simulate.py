@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 os.environ.setdefault("NUMBA_OPT", "1")
@@ -15,7 +15,6 @@ from tcrctl.experiment.prepare import Experiment, build_parts, build_plant, prep
 from tcrctl.experiment.spec import LoadedSpec, load_spec
 from tcrctl.experiment.summary import Measures
 from tcrctl.loop.loop import run_loop
-from tcrctl.loop.pacing import Unpaced
 
 
 @dataclass(frozen=True)
@@ -54,18 +53,8 @@ def run(experiment: Experiment) -> Outcome:
     """Run a prepared experiment."""
     metrics, failure = Metrics(experiment.steps, paced=False), ""
     try:
-        parts = build_parts(experiment, *build_plant(experiment))
-        run_loop(
-            parts.trajectory,
-            parts.estimator,
-            parts.controller,
-            parts.plant,
-            metrics.add,
-            period=experiment.period,
-            duration=parts.trajectory.duration,
-            pace=Unpaced(),
-            limits=experiment.safety,
-        )
+        parts, _ = build_parts(experiment, *build_plant(experiment))
+        run_loop(replace(parts, record=metrics.add))
     except TcrctlError as error:
         failure = str(error)
     return Outcome(metrics.measures(), failure)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol, runtime_checkable
 
 from tcrctl.signals import Array
 
@@ -31,9 +31,10 @@ NORMAL: Final = 2e-3
 TENSION: Final = 0.1
 
 
+@runtime_checkable
 class Remembers(Protocol):
     """A part that can show its memory."""
 
     def memory(self) -> Mapping[str, Kept]:
-        """Every array that the next step depends on, by name; starting points of iterations need not be there."""
+        """Return every array that the next step depends on, by name; an iteration's start may be left out."""
         ...

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Annotated, Any, Self, TypeAlias, TypeVar
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, ClassVar, Self, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
@@ -23,6 +23,9 @@ class Settings(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
     )
+
+    #: Keys that were here before, and the section below this one that has them now.
+    moved: ClassVar[Mapping[str, str]] = {}
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         """Itself: settings never change."""
@@ -93,3 +96,28 @@ class _OffSwitch:
 
 OrOff = Annotated[T | None, _OffSwitch()]
 """A section that may be written ``off``."""
+
+
+class ShortKind:
+    """Lets a section that is told apart by ``kind`` be written as the bare name of one.
+
+    A map without ``kind`` has the first of them.
+    """
+
+    def __init__(self, *kinds: str) -> None:
+        self._kinds = kinds
+
+    def _from_file(self, value: Any) -> Any:
+        if isinstance(value, str):
+            return {"kind": value}
+        return {"kind": self._kinds[0], **value} if isinstance(value, dict) else value
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(self._from_file, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [handler(schema), {"enum": list(self._kinds)}]}

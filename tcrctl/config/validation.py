@@ -119,8 +119,19 @@ def _closest(given: Any, allowed: list[str]) -> str:
 
 
 def _unknown_key(key: str, models: list[Tagged]) -> str:
+    for model, _ in models:
+        section = getattr(model, "moved", {}).get(key)
+        if section is not None:
+            return f"belongs to {section}: write {_written_below(section, key, model)}"
     allowed = list(dict.fromkeys(name for model, _ in models for name in model.model_fields))
     return f"unknown key{_closest(key, allowed)}; allowed: {', '.join(allowed)}"
+
+
+def _written_below(section: str, key: str, model: type[BaseModel]) -> str:
+    """Return how a key that was moved into a section below is written there, and for which kinds."""
+    below = [m for m, _ in models_in(model.model_fields[section].annotation) if key in m.model_fields]
+    text = f"{section}: {{kind: {kind_of(below[0])}, {key}: ...}}"
+    return f"{text}; kinds that have it: {', '.join(kind_of(m) for m in below)}"
 
 
 def _missing_kind(models: list[Tagged]) -> str:

@@ -2,14 +2,39 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from tcrctl.signals import Array
 
 
+class Grid(NamedTuple):
+    """When a prediction looks, and when its inputs change.
+
+    Attributes:
+        ahead: Prediction instants after the step, equally spaced (n,) [s].
+        edges: Instants at which the input blocks begin, and the end (blocks + 1,).
+    """
+
+    ahead: Array
+    edges: Array
+
+    @property
+    def blocks(self) -> int:
+        """Number of input blocks."""
+        return int(self.edges.shape[0]) - 1
+
+
+def make_grid(instants: int, blocks: int, horizon: float) -> Grid:
+    """Divide a ``horizon`` [s] into equal instants and growing blocks."""
+    ahead: Array = np.arange(1.0, instants + 1.0) * (horizon / instants)
+    return Grid(ahead, block_edges(instants, blocks))
+
+
 def block_edges(instants: int, blocks: int) -> Array:
-    """First instant of every block and the end (blocks + 1,): lengths grow about twofold, at least 1."""
+    """Return the first instant of every block and the end (blocks + 1,): lengths grow about twofold, at least 1."""
     edges = [0]
     for b in range(1, blocks):
         wanted = round(instants * (2**b - 1) / (2**blocks - 1))
@@ -19,7 +44,7 @@ def block_edges(instants: int, blocks: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def superpose(change: Array, now: Array, edges: Array) -> tuple[Array, Array]:
-    """Outputs for piecewise constant speeds from the responses to ramps that begin now.
+    """Find outputs for piecewise constant speeds from the responses to ramps that begin now.
 
     Args:
         change: Responses (n, rows, m + 1) of robot.response.

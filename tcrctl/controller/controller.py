@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Protocol
 
-from tcrctl.controller.inner_map import InnerMap
+from tcrctl.config.settings import Settings
 from tcrctl.controller.instantaneous import InstantaneousOptimalControl
 from tcrctl.controller.kinematic import Kinematic
 from tcrctl.controller.literal import LiteralIoc
 from tcrctl.controller.open_loop import OpenLoop
-from tcrctl.controller.settings import ControllerSettings, KinematicSettings, OpenLoopSettings
-from tcrctl.memory import Kept
+from tcrctl.controller.plan import Planner
+from tcrctl.controller.settings import ControllerSettings, IocSettings, KinematicSettings, OpenLoopSettings
+from tcrctl.controller.shell import Shell
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
@@ -26,28 +27,33 @@ class Controller(Protocol):
     ahead: Array
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
-        """Command for the coming period, within speed and stroke limits, and how it was found."""
+        """Return the command for the coming period, within speed and stroke limits, and how it was found."""
         ...
 
-    def sharpen(self) -> None:
-        """From now on solve to rounding: what a tick tolerates is a step in the map that is to be linearised."""
-        ...
 
-    def memory(self) -> Mapping[str, Kept]:
-        """What the next command depends on; see :class:`tcrctl.memory.Remembers`."""
-        ...
+def _ioc(settings: IocSettings, robot: Robot) -> Controller:
+    return Shell(settings, robot, PLANNERS[settings.prediction.kind](settings, robot))
 
-    def inner_map(self) -> InnerMap | None:
-        """The iteration of the last step; None if there is none, or it did not end in a solution."""
-        ...
+
+def _kinematic(settings: KinematicSettings, robot: Robot) -> Controller:
+    return Shell(settings, robot, Kinematic(settings, robot))
+
+
+#: What finds the inputs of ``kind: ioc``, for every ``prediction.kind``.
+PLANNERS: Final[Mapping[str, Callable[[IocSettings, Robot], Planner]]] = {
+    "multi_step": InstantaneousOptimalControl,
+    "one_step": InstantaneousOptimalControl,
+    "literal": LiteralIoc,
+}
+#: Settings and builder of every ``controller.kind``.
+KINDS: Final[Mapping[str, tuple[type[Settings], Callable[[Any, Robot], Controller]]]] = {
+    "ioc": (IocSettings, _ioc),
+    "kinematic": (KinematicSettings, _kinematic),
+    "open_loop": (OpenLoopSettings, OpenLoop),
+}
 
 
 def build_controller(settings: ControllerSettings, robot: Robot) -> Controller:
     """Build the controller of a ``controller:`` section."""
-    if isinstance(settings, OpenLoopSettings):
-        return OpenLoop(settings, robot)
-    if isinstance(settings, KinematicSettings):
-        return Kinematic(settings, robot)
-    if settings.prediction == "literal":
-        return LiteralIoc(settings, robot)
-    return InstantaneousOptimalControl(settings, robot)
+    _, build = KINDS[settings.kind]
+    return build(settings, robot)

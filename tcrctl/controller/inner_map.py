@@ -1,12 +1,13 @@
-"""The iteration inside one control step as a map z^(j) -> z^(j+1), of which (42) asks the eigenvalues."""
+"""What only a stability analysis asks of a controller: its memory, and the map z^(j) -> z^(j+1) of (42)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from tcrctl.memory import Remembers
 from tcrctl.robot import linear
 from tcrctl.robot.equations import Load, assemble, make_workspace
 from tcrctl.robot.model import FIXED
@@ -30,8 +31,21 @@ class InnerMap(NamedTuple):
     apply: Callable[[Array], Array]
 
 
+@runtime_checkable
+class Linearisable(Remembers, Protocol):
+    """A part of a controller, or a whole one, that can be linearised; the loop itself needs nothing of this."""
+
+    def sharpen(self) -> None:
+        """Solve to rounding from now on: what a tick tolerates is a step in the map that is linearised."""
+        ...
+
+    def inner_map(self) -> InnerMap | None:
+        """Return the iteration of the last step; None if there is none, or it did not end in a solution."""
+        ...
+
+
 def newton_map(what: str, robot: Robot, load: Load, drive: Array, q: Array) -> InnerMap:
-    """One full Newton step of r(q) = 0 with the drives held, about a solution.
+    """Return one full Newton step of r(q) = 0 with the drives held, about a solution.
 
     Its derivative at the solution itself is 0, so what is found there is what the tolerance has left.
 

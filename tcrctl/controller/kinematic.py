@@ -1,6 +1,6 @@
 """``kind: kinematic``: resolved motion rate control with the static map, a baseline to compare with [WH69].
 
-    J = ∂h/∂q ∂q_eq/∂d          static map of the model at the present drives
+    J = ∂y/∂q ∂q_eq/∂d          static map of the model at the present drives
     u = J⁺ (dy_d/dt + k (y_d + shift - y)) + Z z
 
 J⁺ is the damped pseudo-inverse [NH86], positions in m and normals times a lever. Z spans the drives that leave the
@@ -14,27 +14,23 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tcrctl.controller.cost import input_limits, pose_error
 from tcrctl.controller.inner_map import InnerMap, newton_map
-from tcrctl.controller.integral import IntegralAction
-from tcrctl.controller.multi_step import TOLERANCE, follow
+from tcrctl.controller.plan import Plan, Situation
 from tcrctl.controller.settings import KinematicSettings, SlackGuard
-from tcrctl.controller.static import rest_map, static_outputs
 from tcrctl.memory import Kept
 from tcrctl.robot.equations import make_workspace
-from tcrctl.robot.equilibrium import TOLERANCE as SHARP
 from tcrctl.robot.equilibrium import static_load
-from tcrctl.robot.potential import Outcome
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
-from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
+from tcrctl.robot.statics import SHARP, TOLERANCE, follow, rest_map, static_outputs
+from tcrctl.signals import Array
 
 #: Directions of the drives that move the end less than this part of the strongest one count as free.
 RANK = 2e-3
 
 
 def resolved_rates(J: Array, rate: Array, damping: float) -> Array:
-    """Drive speeds (m,) that move the end at ``rate`` (r,): u = J'(J J' + μ² I)⁻¹ rate [NH86].
+    """Return drive speeds (m,) that move the end at ``rate`` (r,): u = J'(J J' + μ² I)⁻¹ rate [NH86].
 
     Args:
         J: Derivatives of the outputs by the drives (r, m).
@@ -49,7 +45,7 @@ def resolved_rates(J: Array, rate: Array, damping: float) -> Array:
 
 
 def free_rates(J: Array, T: Array, rate: Array) -> Array:
-    """Drive speeds (m,) that leave the end where it is and change the tensions as nearly as they can.
+    """Return drive speeds (m,) that leave the end where it is and change the tensions as nearly as they can.
 
     Args:
         J: Derivatives of the outputs by the drives (r, m).
@@ -69,72 +65,58 @@ class Kinematic:
 
     Attributes:
         ahead: The end of the coming period (1,) [s].
+        blocks: One block of inputs.
     """
 
+    extrapolates, anti_windup = False, True
+
     def __init__(self, settings: KinematicSettings, robot: Robot) -> None:
+        """Take a ``controller:`` section and the robot."""
         self._settings, self._robot = settings, robot
         rows = 6 if settings.output == "pose" else 3
         self._scale = np.array([1.0] * 3 + [settings.lever_mm / 1000.0] * 3)[:rows]
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
         self._at = rest_map(robot)
-        self._integral = IntegralAction(settings.integral, settings.period_s)
         self._solved, self._tolerance = False, TOLERANCE
-        self._normal = robot.rest_normal if settings.output == "pose" else None
-        self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
-        self.ahead = np.array([settings.period_s])
+        self.ahead, self.blocks = np.array([settings.period_s]), 1
 
     def sharpen(self) -> None:
-        """See :class:`tcrctl.controller.controller.Controller`."""
+        """See :class:`tcrctl.controller.inner_map.Linearisable`."""
         self._tolerance = SHARP
 
     def memory(self) -> Mapping[str, Kept]:
-        """Integral action."""
-        return self._integral.memory(self._normal)
+        """Return nothing: the static map is where the iteration starts, not where it ends."""
+        return {}
 
     def inner_map(self) -> InnerMap | None:
-        """Newton's iteration of the statics at the present drives."""
+        """Return Newton's iteration of the statics at the present drives."""
         what, at = "Newton on the statics", self._at
         return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
-    def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
-        """Command for the coming period; the drives are held if the static map is not known."""
-        h, robot = self._settings.period_s, self._robot
-        error = pose_error(reference, estimate.position, estimate.normal)
-        self._normal = estimate.normal if self._settings.output == "pose" else None
-        shift = self._integral.update(error, bool(self._saturated.any()))
-        good, reason = Outcome(False, 0, np.inf, 0.0), "the estimate is not usable"
-        tension, gain = estimate.tension, np.zeros((POSE_ROWS + robot.n_cables, robot.n_cables))
-        if estimate.converged and np.isfinite(estimate.q).all():
-            at = self._at
-            good = Outcome(*follow(robot.model, self._load, self._work, *at, estimate.drive, self._tolerance))
-            reason = "" if good.converged else "the model has no stable equilibrium at the present drives"
-        self._solved = good.converged
-        if not reason:
-            rest, gain = static_outputs(robot.model, self._work, self._at, robot.tip)
-            tension = rest[POSE_ROWS:]
-        wanted = np.zeros(robot.n_cables) if reason else self._rates(reference, error + shift, tension, gain)
-        speed = self._within_limits(wanted, estimate.drive)
-        self._saturated = np.abs(speed) >= (1.0 - 1e-9) * self._settings.speed_limit_mm_s / 1000.0
-        info = ControlInfo(
-            converged=not reason,
-            iterations=good.iterations,
-            residual=good.residual,
-            lcp_residual=0.0,
-            lcp_pivots=0,
-            saturated=self._saturated,
-            predicted_tension=tension + h * (gain[POSE_ROWS:] @ speed),
-            integral=shift,
-            reason=reason,
-        )
-        return Command(speed, estimate.drive + h * speed), info
+    def plan(self, at: Situation) -> Plan:
+        """Find the speeds that move the end as wanted, by the static map at the present drives."""
+        robot, drive, tension = self._robot, at.estimate.drive, at.estimate.tension
+        self._solved = False
+        if at.doubt:
+            return Plan(np.zeros_like(drive), tension, 0, np.inf)
+        found = follow(robot.model, self._load, self._work, self._at, drive, self._tolerance)
+        self._solved = found.converged
+        if not found.converged:
+            reason = "the model has no stable equilibrium at the present drives"
+            return Plan(np.zeros_like(drive), tension, found.iterations, found.residual, reason=reason)
+        rest, gain = static_outputs(robot.model, self._work, self._at, robot.tip)
+        speed = at.within(self._shortened(self._rates(at, rest[POSE_ROWS:], gain)))
+        tension = rest[POSE_ROWS:] + self._settings.period_s * (gain[POSE_ROWS:] @ speed)
+        return Plan(speed, tension, found.iterations, found.residual)
 
-    def _rates(self, reference: Reference, error: Array, tension: Array, gain: Array) -> Array:
-        """Drive speeds before the limits (m,) [m/s]."""
+    def _rates(self, at: Situation, tension: Array, gain: Array) -> Array:
+        """Return drive speeds before the limits (m,) [m/s] from tensions (m,) [N] and static gain (7 + m, m)."""
+        reference = at.reference
         ahead = None if reference.ahead_normal is None else reference.ahead_normal[0]
         before = np.zeros(3) if reference.normal is None else reference.normal
         turn = np.zeros(3) if ahead is None else ahead - before
         move = np.concatenate([reference.ahead_position[0] - reference.position, turn])
-        rate = move / self._settings.period_s + self._settings.gain_1_s * error
+        rate = move / self._settings.period_s + self._settings.gain_1_s * (at.error + at.shift)
         rows = self._scale.shape[0]
         J = self._scale[:, None] * gain[:rows]
         speed = resolved_rates(J, self._scale * rate[:rows], self._settings.damping)
@@ -143,10 +125,8 @@ class Kinematic:
             speed = speed + free_rates(J, gain[POSE_ROWS:], guard.gain_1_s * (guard.reference_n - tension))
         return speed
 
-    def _within_limits(self, speed: Array, drive: Array) -> Array:
-        """Shorten to the speed limit, which keeps the direction, and stop drives at the ends of their stroke."""
+    def _shortened(self, speed: Array) -> Array:
+        """Return the speeds shortened to the speed limit, which keeps their direction."""
         fastest = float(np.max(np.abs(speed)))
         limit = self._settings.speed_limit_mm_s / 1000.0
-        low, high = input_limits(self._settings, self._robot, drive, 1)
-        kept: Array = np.clip(speed * min(1.0, limit / fastest) if fastest > 0.0 else speed, low, high)
-        return kept
+        return speed * min(1.0, limit / fastest) if fastest > 0.0 else speed

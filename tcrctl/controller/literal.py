@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tcrctl.controller.cost import input_limits, make_target, make_weights, pose_error
+from tcrctl.controller.cost import make_target, make_weights
 from tcrctl.controller.inner_map import InnerMap
-from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.ioc import Prediction, Solution, build_ioc, solve_ioc
+from tcrctl.controller.plan import Plan, Situation
 from tcrctl.controller.settings import IocSettings
 from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.numerics.generalized_alpha import coefficients
@@ -28,7 +28,7 @@ from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.model import FIXED
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
-from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
+from tcrctl.signals import Array
 
 #: Convergence error ε of (41) and spectral radius ρ of (15), the paper's values.
 EPSILON = 2e-6
@@ -57,52 +57,52 @@ class Fixed(NamedTuple):
 
 
 class LiteralIoc:
-    """Algorithm 1. State: last input.
+    """Algorithm 1. It has neither a prediction from an older estimate nor an anti-windup.
 
     Attributes:
         ahead: The one prediction instant (1,) [s].
+        blocks: One block of inputs.
+        gain: ∂q/∂d where the iteration was linearised last (12 n_modules, m).
     """
 
+    extrapolates = anti_windup = False
+
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
+        """Take a ``controller:`` section and the robot."""
         self._settings, self._robot = settings, robot
         self._weights = make_weights(settings, robot.n_cables, 1)
-        self._integral = IntegralAction(settings.integral, settings.period_s)
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
-        self._gain = np.zeros((self._work.r.shape[0], robot.n_cables))
-        self._normal = robot.rest_normal if settings.output == "pose" else None
-        self._speed = np.zeros(robot.n_cables)
+        self.gain = np.zeros((self._work.r.shape[0], robot.n_cables))
         self._last: tuple[Array, Array, Fixed] | None = None
-        self.ahead = np.array([settings.period_s])
+        self.ahead, self.blocks = np.array([settings.period_s]), 1
 
-    def _load(self, estimate: Estimate, v: Array) -> tuple[Array, Load]:
+    def _load(self, at: Situation) -> tuple[Array, Load]:
         """Start positions and load of the step (12)-(14) with zero acceleration at its start; or of statics."""
-        h, s, robot = self._settings.period_s, self._scratch, self._robot
+        period, s, robot, x = self._settings.period_s, self._scratch, self._robot, at.estimate
         if self._settings.model == "static":
-            return estimate.q.copy(), static_load(robot.model, robot.weight)
-        c = coefficients(RHO, h)
+            return x.q.copy(), static_load(robot.model, robot.weight)
+        c = coefficients(RHO, period)
         inertia = c.acceleration + robot.model.damping * c.velocity
-        q0 = estimate.q + h * v
-        s.nodal[Q_FREE] = q0 - robot.model.damping * v / inertia
+        q0 = x.q + period * x.v
+        s.nodal[Q_FREE] = q0 - robot.model.damping * x.v / inertia
         s.nodal[FORCE] = robot.weight
-        dynamics.lengths_before(
-            robot.model, estimate.q, v, estimate.drive, self._speed, 0.5 * h, s, self._work
-        )
+        dynamics.lengths_before(robot.model, x.q, x.v, x.drive, at.previous, 0.5 * period, s, self._work)
         own = (array.copy() for array in (s.nodal, s.bar_before, s.cable_before))
-        return q0, Load(inertia, 2.0 / h, *own)
+        return q0, Load(inertia, 2.0 / period, *own)
 
     def _linearise(self, q: Array, drive: Array, load: Load, speed: Array) -> tuple[Array, Prediction]:
         """Newton step (12 n_modules,) at the present input, and the outputs as (31)."""
-        h, tip, ws = self._settings.period_s, self._robot.tip, self._work
+        period, tip, ws = self._settings.period_s, self._robot.tip, self._work
         assemble(self._robot.model, q, drive, load, ws, True)
         linear.factor_shifted(ws.K, ws.U)
         step = np.zeros(ws.r.shape[0])
         linear.solve(ws, -ws.r, step)
-        linear.drive_gain(ws, self._gain)
+        linear.drive_gain(ws, self.gain)
         first, m = 3 * (tip - FIXED), speed.shape[0]
         C = pose.output_matrix(q, tip)
         gain = np.empty((1, POSE_ROWS + m, m))
-        gain[0, :POSE_ROWS] = h * (C @ self._gain[first : first + 9])
-        gain[0, POSE_ROWS:] = h * linear.tension_gain(ws, self._gain)
+        gain[0, :POSE_ROWS] = period * (C @ self.gain[first : first + 9])
+        gain[0, POSE_ROWS:] = period * linear.tension_gain(ws, self.gain)
         now = np.concatenate([pose.position(q, tip), pose.normal(q, tip), [pose.twist(q, tip)], ws.tension])
         now[:POSE_ROWS] += C @ step[first : first + 9]
         now[POSE_ROWS:] += ws.axial * (ws.G[:, 3 * FIXED :] @ step)
@@ -110,21 +110,21 @@ class LiteralIoc:
 
     def _iterate(self, q: Array, speed: Array, fixed: Fixed) -> tuple[Array, Solution]:
         """(28) with (36): change of the free coordinates (12 n_modules,), and the new input with proof."""
-        h = self._settings.period_s
-        step, prediction = self._linearise(q, fixed.drive + h * speed, fixed.load, speed)
+        period = self._settings.period_s
+        step, prediction = self._linearise(q, fixed.drive + period * speed, fixed.load, speed)
         problem = build_ioc(prediction, fixed.target, fixed.previous, fixed.low, fixed.high, self._weights)
-        solution = Solution(*solve_ioc(problem, prediction, self._weights))
-        return step + h * (self._gain @ (solution.inputs - speed)), solution
+        solution = solve_ioc(problem, prediction, self._weights)
+        return step + period * (self.gain @ (solution.inputs - speed)), solution
 
     def sharpen(self) -> None:
         """Nothing to do: (41) always ends with a whole Newton step."""
 
     def memory(self) -> Mapping[str, Kept]:
-        """Last input and integral action."""
-        return {"speed": Kept(self._speed, SPEED), **self._integral.memory(self._normal)}
+        """Return nothing: all but the last input is in the estimate."""
+        return {}
 
     def inner_map(self) -> InnerMap | None:
-        """(43) about the solution of the last step.
+        """Return (43) about the solution of the last step.
 
         z are the free coordinates and the input, which stands for the actuation nodes (20). The multipliers of
         (22) enter it linearly, so z^(j+1) does not depend on theirs: they only add eigenvalues 0.
@@ -145,36 +145,28 @@ class LiteralIoc:
             "(28) with (36): Newton and LCP together", np.concatenate([q[first:], speed]), scale, apply
         )
 
-    def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
-        """Command for the coming period; the drives are held if (41) was not reached."""
-        h, m = self._settings.period_s, self._robot.n_cables
-        self._normal = estimate.normal if self._settings.output == "pose" else None
-        shift = self._integral.update(pose_error(reference, estimate.position, estimate.normal), False)
-        low, high = input_limits(self._settings, self._robot, estimate.drive, 1)
-        q, load = self._load(estimate, estimate.v)
-        target = make_target(self._settings, reference, shift, m)
-        fixed = Fixed(estimate.drive.copy(), load, target, self._speed, low, high)
-        speed, change, iteration = self._speed, np.inf, 0
+    def plan(self, at: Situation) -> Plan:
+        """Iterate (28) until (41) holds."""
+        q, load = self._load(at)
+        target = make_target(self._settings, at.reference, at.shift, self._robot.n_cables)
+        fixed = Fixed(at.estimate.drive.copy(), load, target, at.previous, at.low, at.high)
+        speed, change, iteration = at.previous, np.inf, 0
         solution = Solution(speed, np.inf, 0, False, 0)
         while change > EPSILON and iteration < MAX_ITERATIONS and np.all(np.isfinite(q)):
             moved, solution = self._iterate(q, speed, fixed)
             q[3 * FIXED :] += moved
             speed, iteration = solution.inputs, iteration + 1
             change = float(np.linalg.norm(moved) / np.linalg.norm(q))
-        good = change <= EPSILON and solution.solved and estimate.converged
-        self._last = (q, speed, fixed) if good else None
-        self._speed = np.clip(speed, low, high) if good else np.zeros(m)
-        info = ControlInfo(
-            converged=good,
+        good = change <= EPSILON and solution.solved
+        self._last = (q, speed, fixed) if good and not at.doubt else None
+        return Plan(
+            speed=speed,
+            tension=self._work.tension.copy(),
             iterations=iteration,
             residual=float(np.max(np.abs(self._work.r))),
             lcp_residual=solution.residual,
             lcp_pivots=solution.pivots,
-            saturated=np.abs(self._speed) >= (1.0 - 1e-9) * self._settings.speed_limit_mm_s / 1000.0,
-            predicted_tension=self._work.tension.copy(),
-            integral=self._integral.shift,
             reason=""
             if good
             else f"(41) was not reached: |dz|/|z| = {change:.2g} after {iteration} iterations",
         )
-        return Command(self._speed, estimate.drive + h * self._speed), info

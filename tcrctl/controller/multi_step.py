@@ -19,79 +19,36 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tcrctl.controller.blocks import block_edges, superpose
+from tcrctl.controller.blocks import Grid, make_grid, superpose
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
-from tcrctl.controller.predictor import Forecast
-from tcrctl.controller.settings import IocSettings
+from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning
+from tcrctl.controller.settings import MultiStepSettings
 from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, pose, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
-from tcrctl.robot.equilibrium import TOLERANCE as SHARP
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.model import FIXED, Model
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.robot.robot import Robot
+from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, StaticMap, follow, rest_map
 from tcrctl.signals import Array, Estimate
-
-#: Largest nodal force left in the model's equilibrium [N]: 1e-5 N moves the softest mode by 3 micrometres.
-TOLERANCE = 1e-5
-MAX_ITERATIONS = 40
 
 
 class Memory(NamedTuple):
     """What the predictor keeps from step to step, changed in place.
 
     Attributes:
-        equilibrium: q_eq (3 n_nodes,) [m].
-        drive: Drives it belongs to (m,) [m].
-        gain: ∂q_eq/∂d (12 n_modules, m).
+        at: Where the model is at rest.
         offset: Δ (3 n_nodes,) [m].
         v: Velocities of the last estimate (3 n_nodes,) [m/s].
         basis: Basis of the response (12 n_modules, modes + m).
     """
 
-    equilibrium: Array
-    drive: Array
-    gain: Array
+    at: StaticMap
     offset: Array
     v: Array
     basis: Array
-
-
-@njit(cache=True, error_model="numpy")
-def follow(
-    model: Model,
-    load: Load,
-    ws: Workspace,
-    equilibrium: Array,
-    drive: Array,
-    gain: Array,
-    wanted: Array,
-    tolerance: float,
-) -> Outcome:
-    """Move the model's equilibrium to other drives, starting where its static gain points to.
-
-    Args:
-        model: Robot arrays.
-        load: Static load.
-        ws: Workspace; afterwards it belongs to the new equilibrium.
-        equilibrium: q_eq (3 n_nodes,) [m], moved.
-        drive: Drives it belongs to (m,) [m], moved.
-        gain: ∂q_eq/∂d (12 n_modules, m) with the taut cables, moved.
-        wanted: The new drives (m,) [m].
-        tolerance: Largest nodal force accepted [N].
-    """
-    q = equilibrium.copy()
-    for k in range(gain.shape[0]):
-        for c in range(drive.shape[0]):
-            q[3 * FIXED + k] += gain[k, c] * (wanted[c] - drive[c])
-    outcome = minimise(model, q, wanted, load, ws, tolerance, int(MAX_ITERATIONS), bool(1))
-    if outcome.converged:
-        equilibrium[:], drive[:] = q, wanted
-        linear.couple(ws, ws.r)
-        linear.drive_gain(ws, gain)
-    return outcome
 
 
 @njit(cache=True, error_model="numpy")
@@ -113,106 +70,67 @@ def _update_offset(
 
 @njit(cache=True, error_model="numpy")
 def forecast(
-    model: Model,
-    load: Load,
-    ws: Workspace,
-    memory: Memory,
-    q: Array,
-    v: Array,
-    drive: Array,
-    period: float,
-    blend: float,
-    ahead: Array,
-    edges: Array,
-    tip: int,
-    now: Array,
-    tolerance: float,
+    model: Model, load: Load, ws: Workspace, memory: Memory, now: Now, grid: Grid, tip: int, tuning: Tuning
 ) -> tuple[Outcome, bool, Array, Array]:
-    """One prediction as in the module's docstring, in one kernel.
+    """Make one prediction as in the module's docstring, in one kernel.
 
     Args:
         model: Robot arrays.
         load: Static load.
         ws: Workspace.
         memory: State of the predictor, moved on by one step.
-        q: Node positions now (3 n_nodes,) [m].
-        v: Node velocities (3 n_nodes,) [m/s].
-        drive: Drive lengths (m,) [m].
-        period: Control period [s].
-        blend: Part of the way that Δ goes in one step; 0 keeps it.
-        ahead: Prediction instants (n,) [s], equally spaced.
-        edges: Instants at which input blocks begin, and the end (blocks + 1,).
+        now: State now.
+        grid: Prediction instants, equally spaced, and input blocks.
         tip: Row of the first node of the tip ring.
-        now: Outputs now (7 + m,).
-        tolerance: Largest nodal force left in the equilibrium [N].
+        tuning: Filter and tolerance.
 
     Returns:
         Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m).
-    """  # fmt: skip
-    outcome = follow(model, load, ws, memory.equilibrium, memory.drive, memory.gain, drive, tolerance)
+    """
+    at, q, v = memory.at, now.q, now.v
+    outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
     deviation, away, finite = np.empty(q.shape[0]), np.empty(q.shape[0]), True
     for k in range(q.shape[0]):
-        deviation[k] = q[k] - memory.equilibrium[k]
+        deviation[k] = q[k] - at.equilibrium[k]
         finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
-    if outcome.converged and blend > 0.0 and finite:
-        _update_offset(model, ws, memory, deviation, v, period, blend)
+    if outcome.converged and tuning.blend > 0.0 and finite:
+        _update_offset(model, ws, memory, deviation, v, tuning.period, tuning.blend)
     for k in range(q.shape[0]):
         memory.v[k] = v[k]
         away[k] = deviation[k] - memory.offset[k]
-    change, stable = response.respond(
-        model,
-        memory.equilibrium,
-        away,
-        v,
-        ahead[0],
-        ahead.shape[0],
-        tip,
-        ws,
-        memory.basis,
-    )
-    free, gain = superpose(change, now, edges)
+    release = response.Release(away, v)
+    change, stable = response.respond(model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis)
+    free, gain = superpose(change, now.outputs, grid.edges)
     return outcome, stable, free, gain
 
 
 class MultiStep:
     """See the module's docstring."""
 
-    def __init__(self, settings: IocSettings, robot: Robot) -> None:
-        self._robot, self._period = robot, settings.period_s
-        self.ahead: Array = np.arange(1.0, settings.instants + 1.0) * (settings.horizon_s / settings.instants)
-        self.blocks = settings.blocks
-        self.edges = block_edges(settings.instants, settings.blocks)
-        offset = settings.offset
-        self._blend = 0.0 if offset is None else -float(np.expm1(-settings.period_s / offset.filter_s))
+    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot) -> None:
+        """Take a ``prediction:`` section, the control period [s] and the robot."""
+        self._robot, self._feedforward = robot, settings.feedforward
+        self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
+        self._tuning = make_tuning(period, settings.filter_s)
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
-        rest, still = robot.rest.q, np.zeros_like(robot.rest.q)
-        minimise(
-            robot.model,
-            rest.copy(),
-            np.zeros(robot.n_cables),
-            self._load,
-            self._work,
-            TOLERANCE,
-            MAX_ITERATIONS,
-            True,
-        )
-        self._solved, self._tolerance = False, TOLERANCE
+        at, still = rest_map(robot), np.zeros_like(robot.rest.q)
+        q, drive = robot.rest.q.copy(), np.zeros(robot.n_cables)
+        minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         basis = response.start_basis(robot.model, self._work, settings.modes)
-        self._memory = Memory(
-            rest.copy(), np.zeros(robot.n_cables), robot.rest.gain.copy(), still, still.copy(), basis
-        )
+        self._memory = Memory(at, still, still.copy(), basis)
+        self._solved = False
 
     def sharpen(self) -> None:
-        """See :class:`Predictor`."""
-        self._tolerance = SHARP
+        """See :class:`tcrctl.controller.inner_map.Linearisable`."""
+        self._tuning = self._tuning.sharp()
 
     def memory(self) -> Mapping[str, Kept]:
-        """Offset and last velocities without the fixed base, if the offset moves.
+        """Return offset and last velocities without the fixed base, if the offset moves.
 
         The basis is left out: it turns within the modes it spans, which changes no response, and with nothing
         left to correct an error of it has no effect of first order.
         """
-        if self._blend == 0.0:
+        if self._tuning.blend == 0.0:
             return {}
         first = 3 * FIXED
         return {
@@ -221,21 +139,21 @@ class MultiStep:
         }
 
     def inner_map(self) -> InnerMap | None:
-        """Newton's iteration of the statics at the present drives."""
-        what, at = "Newton on the statics; one LCP after it, not fed back", self._memory
+        """Return Newton's iteration of the statics at the present drives."""
+        what, at = "Newton on the statics; one LCP after it, not fed back", self._memory.at
         return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
-    def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
+    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""
         del speed  # the prediction is linear: it does not depend on the last input
+        robot, memory = self._robot, self._memory
+        now = Now(estimate.q + age * estimate.v, estimate.v, estimate.drive, outputs)
         outcome, stable, free, gain = forecast(
-            self._robot.model, self._load, self._work, self._memory, estimate.q + age * estimate.v, estimate.v,
-            estimate.drive, self._period, self._blend, self.ahead, self.edges, self._robot.tip,
-            now, self._tolerance,
-        )  # fmt: skip
-        outcome = Outcome(*outcome)
-        good = outcome.converged and stable
+            robot.model, self._load, self._work, memory, now, self.grid, robot.tip, self._tuning
+        )
+        good, self._solved = outcome.converged and stable, outcome.converged
         reason = "" if good else "the model has no stable equilibrium at the present drives"
-        self._solved = outcome.converged
-        at_rest = pose.drive_gain(self._memory.equilibrium, self._memory.gain, self._robot.tip)[:6]
+        at_rest = None
+        if self._feedforward:
+            at_rest = pose.drive_gain(memory.at.equilibrium, memory.at.gain, robot.tip)[:6]
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)

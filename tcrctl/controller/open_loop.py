@@ -31,14 +31,14 @@ class OpenLoop:
         """Nothing is solved."""
 
     def memory(self) -> Mapping[str, Kept]:
-        """Nothing is remembered."""
+        """Return nothing: nothing is remembered."""
         return {}
 
     def inner_map(self) -> None:
         """Nothing is iterated."""
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
-        """Command that brings the drives to their lengths by the end of the period, within the limits.
+        """Return the command that brings the drives to their lengths by the end of the period, within the limits.
 
         Raises:
             InputError: If the trajectory gives no drive lengths.

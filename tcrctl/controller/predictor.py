@@ -1,15 +1,56 @@
-"""What the controller needs of a prediction of the end pose and the tensions over its horizon."""
+"""A prediction of the end pose and the tensions over a horizon: what it is told, what it gives."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
-from tcrctl.controller.inner_map import InnerMap
+import numpy as np
+
+from tcrctl.controller.blocks import Grid
+from tcrctl.controller.inner_map import Linearisable
 from tcrctl.controller.ioc import Prediction
-from tcrctl.memory import Kept
+from tcrctl.robot.statics import SHARP, TOLERANCE
 from tcrctl.signals import Array, Estimate
+
+
+class Now(NamedTuple):
+    """What a kernel is told of the present.
+
+    Attributes:
+        q: Node positions (3 n_nodes,) [m].
+        v: Node velocities (3 n_nodes,) [m/s].
+        drive: Drive lengths d (m,) [m].
+        outputs: Outputs as they should be now (7 + m,).
+    """
+
+    q: Array
+    v: Array
+    drive: Array
+    outputs: Array
+
+
+class Tuning(NamedTuple):
+    """Numbers that a kernel needs beside arrays.
+
+    Attributes:
+        period: Control period [s].
+        blend: Part of the way that the offset Δ goes in one step; 0 keeps it.
+        tolerance: Largest nodal force left in the equilibrium [N].
+    """
+
+    period: float
+    blend: float
+    tolerance: float = TOLERANCE
+
+    def sharp(self) -> Tuning:
+        """Return the same with solutions that are exact to rounding."""
+        return self._replace(tolerance=SHARP)
+
+
+def make_tuning(period: float, filter_s: float | None) -> Tuning:
+    """Return the tuning of an offset filter with a time constant [s], or of none."""
+    return Tuning(period, 0.0 if filter_s is None else -float(np.expm1(-period / filter_s)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +63,7 @@ class Forecast:
         iterations: Newton iterations.
         residual: Largest nodal force left [N].
         reason: Empty, or why it cannot be trusted.
-        rest_gain: Derivatives of position and normal by the drives at rest (6, m), if it knows them.
+        rest_gain: Derivatives of position and normal by the drives at rest (6, m), for a feedforward; or None.
     """
 
     prediction: Prediction
@@ -33,38 +74,22 @@ class Forecast:
     rest_gain: Array | None = None
 
 
-class Predictor(Protocol):
+class Predictor(Linearisable, Protocol):
     """One way to predict.
 
     Attributes:
-        ahead: Prediction instants after the step (n,) [s].
-        blocks: Number of input blocks.
-        edges: Instants at which the blocks begin, and the end (blocks + 1,).
+        grid: Prediction instants and input blocks.
     """
 
-    ahead: Array
-    blocks: int
-    edges: Array
+    grid: Grid
 
-    def predict(self, estimate: Estimate, age: float, now: Array, speed: Array) -> Forecast:
+    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array) -> Forecast:
         """Predict from an estimate that is ``age`` [s] old.
 
         Args:
             estimate: The state.
             age: Its age [s].
-            now: Outputs (7 + m,) as they should be now.
+            outputs: Outputs (7 + m,) as they should be now.
             speed: The last input (m,) [m/s].
         """
-        ...
-
-    def sharpen(self) -> None:
-        """From now on solve to rounding: what a tick tolerates is a step in the map that is to be linearised."""
-        ...
-
-    def memory(self) -> Mapping[str, Kept]:
-        """What the next prediction depends on; see :class:`tcrctl.memory.Remembers`."""
-        ...
-
-    def inner_map(self) -> InnerMap | None:
-        """The iteration of the last prediction; None if it did not end in a solution."""
         ...

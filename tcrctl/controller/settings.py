@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated, Literal, TypeAlias
+from collections.abc import Iterator, Mapping
+from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
-from tcrctl.config.settings import OrOff, Path, Settings, quantity, refuse
+from tcrctl.config.settings import OrOff, Path, Settings, ShortKind, quantity, refuse
+
+#: Modes of a response, if the file does not say.
+MODES: Final = 8
+#: Largest distance of two prediction instants [s]; the slow modes swing at about 1 Hz.
+LONGEST_SPACING: Final = 0.25
 
 
 class CostWeights(Settings):
@@ -59,45 +64,105 @@ class OffsetSettings(Settings):
     filter_s: float = quantity("s", "time constant of the estimate", 0.3, gt=0)
 
 
+class MultiStepSettings(Settings):
+    """Linear response over the horizon, or with ``model: static`` the static answer to the drives."""
+
+    kind: Literal["multi_step"]
+    horizon_s: float = quantity("s", "prediction horizon, at least one control period", 0.8, gt=0, le=60)
+    instants: int = Field(
+        default=16, ge=1, le=60, description="equally spaced prediction instants in the horizon"
+    )
+    blocks: int = Field(default=4, ge=1, le=12, description="piecewise constant inputs over the horizon")
+    modes: int = Field(default=MODES, ge=1, le=60, description="modes of the response; model: dynamic only")
+    offset: OrOff[OffsetSettings] = Field(
+        default=OffsetSettings(), description="offset of the equilibrium, or off"
+    )
+    feedforward: bool = Field(
+        default=True,
+        description="changes of drive speed are weighed against those that the reference needs, not against none",
+    )
+
+    @property
+    def filter_s(self) -> float | None:
+        """Time constant of the offset [s]; None if it is off."""
+        return None if self.offset is None else self.offset.filter_s
+
+    def misfits(self, period_s: float, model: str) -> Iterator[tuple[Path, str]]:
+        """Yield path and message of what does not go with a control period [s] and a model."""
+        yield from _too_short(self.horizon_s, period_s)
+        if model == "static" and self.modes != MODES:
+            yield ("modes",), "has no meaning with model: static; leave it out"
+
+    @model_validator(mode="after")
+    def _agrees_with_itself(self) -> MultiStepSettings:
+        refuse(self._disagreements())
+        return self
+
+    def _disagreements(self) -> Iterator[tuple[Path, str]]:
+        if self.horizon_s / self.instants > LONGEST_SPACING:
+            yield ("instants",), f"must be so many that instants lie at most {LONGEST_SPACING:g} s apart"
+        if self.blocks > self.instants:
+            yield ("blocks",), f"must be at most instants, {self.instants}, not {self.blocks}"
+
+
+class OneStepSettings(Settings):
+    """One backward-Euler step as long as the horizon."""
+
+    kind: Literal["one_step"]
+    horizon_s: float = quantity("s", "prediction horizon, at least one control period", 0.8, gt=0, le=60)
+
+    def misfits(self, period_s: float, model: str) -> Iterator[tuple[Path, str]]:
+        """Yield path and message of what does not go with a control period [s] and a model."""
+        yield from _too_short(self.horizon_s, period_s)
+        if model == "static":
+            yield (
+                (),
+                "one_step is a time step of the equations of motion; statics go with multi_step or literal",
+            )
+
+
+class LiteralSettings(Settings):
+    """The paper's Algorithm 1: one generalized-alpha step of one control period, or its static form."""
+
+    kind: Literal["literal"]
+
+    def misfits(self, period_s: float, model: str) -> Iterator[tuple[Path, str]]:
+        """Yield nothing: it has no horizon but the control period, and goes with both models."""
+        del period_s, model
+        yield from ()
+
+
+def _too_short(horizon_s: float, period_s: float) -> Iterator[tuple[Path, str]]:
+    if horizon_s < period_s:
+        yield ("horizon_s",), f"must be at least period_s, {period_s:g}, not {horizon_s:g}"
+
+
+Prediction: TypeAlias = Annotated[
+    MultiStepSettings | OneStepSettings | LiteralSettings,
+    Field(discriminator="kind"),
+    ShortKind("multi_step", "one_step", "literal"),
+]
+"""Union of all kinds of prediction; the bare name of a kind stands for that kind with its defaults."""
+
+
 class IocSettings(Settings):
     """Instantaneous optimal control (30)-(41) with a prediction horizon of its own."""
+
+    moved: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("horizon_s", "instants", "blocks", "modes", "offset", "feedforward"), "prediction"
+    )
 
     kind: Literal["ioc"]
     output: Literal["position", "pose"] = Field(default="position", description="what is tracked")
     period_s: float = quantity("s", "control period", 0.05, gt=0, le=10)
-    horizon_s: float = quantity("s", "prediction horizon, at least one period", 0.8, gt=0, le=60)
     model: Literal["dynamic", "static"] = Field(
         default="dynamic",
         description="dynamic: the equations of motion; static: their static form, the end follows the drives "
         "at once",
     )
-    prediction: Literal["multi_step", "one_step", "literal"] = Field(
-        default="multi_step",
-        description="multi_step: linear response over the horizon; one_step: one backward-Euler step as long "
-        "as the horizon; literal: the paper's Algorithm 1, one generalized-alpha step of one period",
-    )
-    instants: int = Field(
-        default=16,
-        ge=1,
-        le=60,
-        description="equally spaced prediction instants in the horizon; prediction: multi_step only",
-    )
-    blocks: int = Field(
-        default=4,
-        ge=1,
-        le=12,
-        description="piecewise constant inputs over the horizon; prediction: multi_step only",
-    )
-    modes: int = Field(
-        default=8, ge=1, le=60, description="modes of the prediction; prediction: multi_step only"
-    )
-    offset: OrOff[OffsetSettings] = Field(
-        default=OffsetSettings(), description="offset of the equilibrium, or off; prediction: multi_step only"
-    )
-    feedforward: bool = Field(
-        default=True,
-        description="changes of drive speed are weighed against those that the reference needs, not against none; "
-        "prediction: multi_step only",
+    prediction: Prediction = Field(
+        default=MultiStepSettings(kind="multi_step"),
+        description="what the outputs will be: multi_step, one_step or literal",
     )
     weights: CostWeights = Field(default=CostWeights(), description="weights of the cost (30)")
     tension: OrOff[TensionSettings] = Field(
@@ -114,15 +179,8 @@ class IocSettings(Settings):
         return self
 
     def _disagreements(self) -> Iterator[tuple[Path, str]]:
-        if self.horizon_s < self.period_s:
-            yield ("horizon_s",), f"must be at least period_s, {self.period_s:g}, not {self.horizon_s:g}"
-        if self.model == "static" and self.prediction == "one_step":
-            what = "one_step is a time step of the equations of motion; statics go with multi_step or literal"
-            yield ("prediction",), what
-        if self.prediction == "multi_step" and self.horizon_s / self.instants > 0.25:
-            yield ("instants",), "must be so many that instants lie at most 0.25 s apart"
-        if self.prediction == "multi_step" and self.blocks > self.instants:
-            yield ("blocks",), f"must be at most instants, {self.instants}, not {self.blocks}"
+        for path, what in self.prediction.misfits(self.period_s, self.model):
+            yield ("prediction", *path), what
         if self.output == "position":
             for key in ("normal", "twist"):
                 if getattr(self.weights, key) > 0:

@@ -18,7 +18,7 @@ from tcrctl.signals import Array
 
 #: Internal time step [s]: twice that of the simulated plant, because this one has to keep up with the clock.
 STEP: Final = 0.002
-SPECTRAL_RADIUS: Final = 0.8
+RULE: Final = dynamics.Rule(STEP, 0.8)
 #: Time that is made up for at once [s]; on a computer that is too slow the robot moves in slow motion.
 LONGEST_CATCH_UP: Final = 0.02
 #: A robot slower than this, whose drives stand still, is not integrated [m/s]; drives: [m].
@@ -90,9 +90,8 @@ class EmulatedRobot:
         if self._still() and np.abs(target - self._state.drive).max() < STILL_DRIVE:
             return
         converged, residual, smallest, _ = dynamics.advance(
-            self.robot.model, self._state, speed, duration, STEP, SPECTRAL_RADIUS, self.robot.weight,
-            self._work, self._scratch,
-        )  # fmt: skip
+            self.robot.model, self._state, speed, duration, RULE, self.robot.weight, self._work, self._scratch
+        )
         if not converged:
             raise DivergenceError(self._time, residual, smallest)
         self._state.drive[:] = target

@@ -9,7 +9,6 @@ from tcrctl.config.settings import Settings
 from tcrctl.estimator.exact import State, build_exact
 from tcrctl.estimator.passive_observer import build_observer
 from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
-from tcrctl.memory import Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Command, Estimate, Measurement
 
@@ -18,11 +17,7 @@ class Estimator(Protocol):
     """Turns measurements into states of the robot model."""
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
-        """State at the time of ``measured``, ``applied`` being the command since the last update."""
-        ...
-
-    def memory(self) -> Mapping[str, Kept]:
-        """What the next update depends on; see :class:`tcrctl.memory.Remembers`."""
+        """Return the state at the time of ``measured``, ``applied`` being the command since the last update."""
         ...
 
 

@@ -24,7 +24,7 @@ from tcrctl.memory import NORMAL, POSITION, SPEED, Kept
 from tcrctl.robot import dynamics, pose
 from tcrctl.robot.equations import FORCE, Q_FREE, SPRING, SPRING_AT, Load, make_workspace
 from tcrctl.robot.module import FIXED, ring_rows
-from tcrctl.robot.potential import Outcome, minimise
+from tcrctl.robot.potential import minimise
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, Estimate, Measurement
 
@@ -54,9 +54,9 @@ class PassiveObserver:
 
     def _load(self, measured: Measurement) -> Load:
         """Inertia of backward Euler, weight and virtual springs of one update."""
-        h, s, model = self._period, self._scratch, self._robot.model
-        inertia = 1.0 / h**2 + model.damping / h
-        s.nodal[Q_FREE] = self._q + self._v / (h * inertia)
+        period, s, model = self._period, self._scratch, self._robot.model
+        inertia = 1.0 / period**2 + model.damping / period
+        s.nodal[Q_FREE] = self._q + self._v / (period * inertia)
         if not np.array_equal(measured.valid, self._valid):
             self._valid = measured.valid.copy()
             self._seen = self._coordinates[np.repeat(self._valid, 3)]
@@ -64,7 +64,7 @@ class PassiveObserver:
             s.nodal[SPRING, self._seen] = self._stiffness * float(np.mean(self._valid)) ** 2
         s.nodal[SPRING_AT, self._seen] = measured.nodes[self._valid].ravel()
         dynamics.lengths_before(model, self._q, self._v, self._drive, self._still, 0.0, s, self._work)
-        return Load(inertia, 1.0 / h, s.nodal, s.bar_before, s.cable_before)
+        return Load(inertia, 1.0 / period, s.nodal, s.bar_before, s.cable_before)
 
     def _correct(self, measured: Measurement) -> tuple[Array, Array]:
         """End position and normal, corrected by what the tip ring's markers say."""
@@ -97,7 +97,7 @@ class PassiveObserver:
         load = self._load(measured)
         q = self._q.copy()
         model, drive = self._robot.model, measured.drive
-        outcome = Outcome(*minimise(model, q, drive, load, self._work, TOLERANCE, MAX_ITERATIONS, False))
+        outcome = minimise(model, q, drive, load, self._work, TOLERANCE, MAX_ITERATIONS, False)
         if outcome.converged:
             self._v, self._q, self._drive = (q - self._q) / self._period, q, drive.copy()
         position, normal = self._correct(measured)

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from tcrctl.controller.controller import Controller, build_controller
+from tcrctl.controller.controller import build_controller
 from tcrctl.controller.settings import IocSettings, OpenLoopSettings
 from tcrctl.errors import InputError, StoppedError
-from tcrctl.estimator.estimator import Estimator, build_estimator
+from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.exact import State
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
-from tcrctl.loop.loop import run_loop, step_count
-from tcrctl.loop.pacing import Unpaced
-from tcrctl.loop.safety import SafetyLimits
+from tcrctl.loop.loop import Parts, run_loop, step_count
+from tcrctl.loop.safety import SafetyGuard, SafetyLimits
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.rig.bench import build_rig
 from tcrctl.plant.rig.session import Session
@@ -82,26 +81,6 @@ class Experiment:
     def safety(self) -> SafetyLimits:
         """When a run is stopped."""
         return SafetyLimits(1e-3 * self.spec.safety.position_error_mm, self.robot.tension_limit)
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """What one run is made of; every run needs new ones.
-
-    Attributes:
-        trajectory: What is wanted, beginning where the plant is.
-        plant: Is measured and driven.
-        estimator: Finds the state.
-        controller: Finds the command.
-        start_offset: Distance of the measured start from that of the trajectory [m]; NaN if the cameras do
-            not see the tip ring, so that it is not known.
-    """
-
-    trajectory: Trajectory
-    plant: RunnablePlant
-    estimator: Estimator
-    controller: Controller
-    start_offset: float
 
 
 def _simulated(
@@ -204,7 +183,7 @@ def build_plant(experiment: Experiment, session: Session | None = None) -> tuple
     return build(settings, experiment, session or Session())
 
 
-def build_parts(experiment: Experiment, plant: RunnablePlant, state: State | None) -> Parts:
+def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> tuple[Parts, float]:
     """Build estimator and controller for a plant at rest, and let the trajectory begin where the plant is.
 
     Args:
@@ -212,18 +191,30 @@ def build_parts(experiment: Experiment, plant: RunnablePlant, state: State | Non
         plant: Is measured, not driven.
         state: Its true positions and velocities if it knows them.
 
+    Returns:
+        The parts of a loop within the experiment's safety limits, for one run; and the distance of the measured
+        start from that of the trajectory [m], NaN if the cameras do not see the tip ring.
+
     Raises:
         InputError: If the estimator needs a state that is not known.
         DeviceError: If the plant cannot be measured.
     """
-    spec, robot = experiment.spec, experiment.robot
+    spec, robot, period = experiment.spec, experiment.robot, experiment.period
     trajectory, offset = experiment.trajectory, np.nan
     found = measured_pose(plant, robot)
     if found is not None:
         offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))
         trajectory = StartBlend(trajectory, *found, spec.start.blend_s, spec.start.approach)
-    estimator = build_estimator(spec.estimator, robot, experiment.period, state)
-    return Parts(trajectory, plant, estimator, build_controller(spec.controller, robot), offset)
+    parts = Parts(
+        trajectory=trajectory,
+        plant=plant,
+        estimator=build_estimator(spec.estimator, robot, period, state),
+        controller=build_controller(spec.controller, robot),
+        period=period,
+        steps=step_count(trajectory.duration, period),
+        guard=SafetyGuard(experiment.safety),
+    )
+    return parts, offset
 
 
 def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple[Array, Array] | None:
@@ -247,8 +238,8 @@ def _rehearse(experiment: Experiment) -> None:
     """Run a few steps with parts of its own, in simulation, so that nothing of the run itself is touched."""
     simulated = SimulatedSettings(kind="simulated")
     plant = SimulatedPlant(simulated, experiment.robot, experiment.period, experiment.spec.seed)
-    parts, metrics = build_parts(experiment, plant, plant.state), Metrics(WARM_UP_STEPS, paced=False)
-    task = make_task(experiment)
+    parts, _ = build_parts(experiment, plant, plant.state)
+    metrics, task = Metrics(WARM_UP_STEPS, paced=False), make_task(experiment)
 
     def record(step: StepRecord) -> None:
         metrics.add(step)
@@ -256,14 +247,4 @@ def _rehearse(experiment: Experiment) -> None:
             task.observe(step)
 
     with suppress(StoppedError):  # a run that ends so shall do it with a log
-        run_loop(
-            parts.trajectory,
-            parts.estimator,
-            parts.controller,
-            plant,
-            record,
-            period=experiment.period,
-            duration=WARM_UP_STEPS * experiment.period,
-            pace=Unpaced(),
-            limits=SafetyLimits(np.inf, np.inf, WARM_UP_STEPS + 1),
-        )
+        run_loop(replace(parts, steps=WARM_UP_STEPS, guard=SafetyGuard(), record=record))

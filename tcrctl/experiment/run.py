@@ -18,7 +18,7 @@ import numpy as np
 
 from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedError, TcrctlError
 from tcrctl.experiment.metrics import Metrics
-from tcrctl.experiment.prepare import Experiment, Notify, Parts, build_parts, build_plant, make_task, silent
+from tcrctl.experiment.prepare import Experiment, Notify, build_parts, build_plant, make_task, silent
 from tcrctl.experiment.provenance import attachments, resolved_text, start_metadata
 from tcrctl.experiment.run_folder import (
     LOG,
@@ -33,9 +33,10 @@ from tcrctl.log.geometry import CableRoute, LogGeometry
 from tcrctl.log.mcap_file import Tap
 from tcrctl.log.writer import LogWriter
 from tcrctl.loop.interruption import Interruption
-from tcrctl.loop.loop import run_loop, step_count
+from tcrctl.loop.loop import Parts, run_loop
 from tcrctl.loop.pacing import Pace, RealTime, Unpaced
 from tcrctl.loop.quiet import quiet_interpreter
+from tcrctl.plant.plant import RunnablePlant
 from tcrctl.plant.rig.journal import Journal
 from tcrctl.plant.rig.session import Session
 from tcrctl.robot.module import RIGID_BARS, module_of, ring_rows
@@ -90,16 +91,16 @@ def run_experiment(
         journal = Journal(pace.time, notify)
         plant, state = build_plant(experiment, Session(pace.time, journal.report, confirmed))
         try:
-            parts = build_parts(experiment, plant, state)
+            parts, start_offset = build_parts(experiment, plant, state)
             folder = make_run_folder(out, experiment.spec.name)
             log = _open_log(experiment, folder, realtime=realtime, tap=tap)
             journal.attach(log.event)
             approach = parts.trajectory.duration - experiment.trajectory.duration
-            journal.report("start", *_start_message(parts.start_offset, approach))
+            journal.report("start", *_start_message(start_offset, approach))
         except BaseException:
             plant.close()
             raise
-        summary = _recorded_run(experiment, parts, pace, folder, log, progress)
+        summary = _recorded_run(experiment, replace(parts, pace=pace), plant, folder, log, progress)
     try:
         folder.write(SUMMARY, (json.dumps(summary.as_json(), indent=2) + "\n").encode())
     except DeviceError as error:  # the run is over and in the log
@@ -151,21 +152,26 @@ def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeome
 
 
 def _recorded_run(
-    experiment: Experiment, parts: Parts, pace: Pace, folder: RunFolder, log: LogWriter, progress: Progress
+    experiment: Experiment,
+    parts: Parts,
+    plant: RunnablePlant,
+    folder: RunFolder,
+    log: LogWriter,
+    progress: Progress,
 ) -> Summary:
     """Run, close the plant, finish the log."""
-    steps = step_count(parts.trajectory.duration, experiment.period)
-    metrics, task = Metrics(steps, paced=isinstance(pace, RealTime)), make_task(experiment)
+    metrics = Metrics(parts.steps, paced=isinstance(parts.pace, RealTime))
+    task = make_task(experiment)
 
     def record(step: StepRecord) -> None:
         log.step(step)
         metrics.add(step)
         for event in () if task is None else task.observe(step):
             log.event(event.t, event.kind, event.level, event.message)
-        progress(step.k + 1, steps)
+        progress(step.k + 1, parts.steps)
 
     with log:
-        failure = _drive(experiment, parts, pace, record, log)
+        failure = _drive(experiment, replace(parts, record=record), plant, log)
         summary = _summary(experiment, folder, metrics, {} if task is None else task.result(), failure)
         try:
             if failure is not None:
@@ -179,30 +185,18 @@ def _recorded_run(
     return summary
 
 
-def _drive(
-    experiment: Experiment, parts: Parts, pace: Pace, record: Callable[[StepRecord], None], log: LogWriter
-) -> TcrctlError | None:
+def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogWriter) -> TcrctlError | None:
     """Go through all steps and leave the plant safe; return why it ended before the end, if it did."""
     failure: TcrctlError | None = None
     try:
-        with _pace_kept(experiment, pace, log):
-            parts.plant.start()
-            run_loop(
-                parts.trajectory,
-                parts.estimator,
-                parts.controller,
-                parts.plant,
-                record,
-                period=experiment.period,
-                duration=parts.trajectory.duration,
-                pace=pace,
-                limits=experiment.safety,
-            )
+        with _pace_kept(experiment, parts.pace, log):
+            plant.start()
+            run_loop(parts)
     except TcrctlError as error:
         failure = error
     finally:
         try:
-            parts.plant.close()
+            plant.close()
         except TcrctlError as error:  # what ended the run first is the reason
             failure = failure or error
     return failure

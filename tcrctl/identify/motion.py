@@ -33,14 +33,14 @@ def marker_motion(robot: Robot, recording: Recording, step: float) -> Array:
     state = dynamics.rest_state(start.q, first)
     work, scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
     work.tension[:] = start.tension
-    n = len(recording.time)
+    n, rule = len(recording.time), dynamics.Rule(step, SPECTRAL_RADIUS)
     q, v = np.empty((n, state.q.size)), np.empty((n, state.q.size))
     q[0], v[0] = state.q, state.v
     for k in range(1, n):
         duration = float(recording.time[k] - recording.time[k - 1])
         speed = (recording.drive[k] - recording.drive[k - 1]) / duration
         converged, residual, smallest, _ = dynamics.advance(
-            robot.model, state, speed, duration, step, SPECTRAL_RADIUS, robot.weight, work, scratch
+            robot.model, state, speed, duration, rule, robot.weight, work, scratch
         )
         if not converged:
             raise DivergenceError(float(recording.time[k]), residual, smallest)
@@ -54,12 +54,12 @@ def marker_motion(robot: Robot, recording: Recording, step: float) -> Array:
 def _between(time: Array, q: Array, v: Array, at: Array) -> Array:
     """Cubic Hermite interpolation of q (n, c) with slopes v at instants ``at`` (f,) within ``time`` (n,)."""
     k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-    h = (time[k + 1] - time[k])[:, None]
-    s = ((at - time[k])[:, None]) / h
+    width = (time[k + 1] - time[k])[:, None]
+    s = ((at - time[k])[:, None]) / width
     found: Array = (
         (1.0 + 2.0 * s) * (1.0 - s) ** 2 * q[k]
-        + s * (1.0 - s) ** 2 * h * v[k]
+        + s * (1.0 - s) ** 2 * width * v[k]
         + s**2 * (3.0 - 2.0 * s) * q[k + 1]
-        + s**2 * (s - 1.0) * h * v[k + 1]
+        + s**2 * (s - 1.0) * width * v[k + 1]
     )
     return found

@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError, TcrctlError
-from tcrctl.log.file_names import ROBOT, VERSIONS
+from tcrctl.log.file_names import RESOLVED, ROBOT, VERSIONS
+from tcrctl.log.older_settings import in_todays_form
 from tcrctl.log.reader import Log
 
 if TYPE_CHECKING:
@@ -52,7 +54,7 @@ class RunFiles:
         return f"{self._path}:{name}"
 
     def document(self, name: str) -> strict_yaml.Document:
-        """Return a YAML file.
+        """Return a YAML file, settings of an older version in the form of today.
 
         Raises:
             InputError: If there is none of that name.
@@ -61,7 +63,8 @@ class RunFiles:
         if name not in self:
             has = ", ".join(self.names) or "none"
             raise InputError(f"{self._path}: it has no attachment {name}; attachments: {has}")
-        return strict_yaml.loads(self._contents[name], self.place(name))
+        read = strict_yaml.loads(self._contents[name], self.place(name))
+        return replace(read, data=in_todays_form(read.data)) if name == RESOLVED else read
 
     def robot(self) -> RobotDescription:
         """Return the robot.

@@ -12,13 +12,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from tcrctl.controller.controller import Controller
+from tcrctl.errors import SafetyLimitError
 from tcrctl.estimator.estimator import Estimator
-from tcrctl.loop.pacing import Pace
-from tcrctl.loop.safety import SafetyGuard, SafetyLimits
+from tcrctl.loop.pacing import Pace, Unpaced
+from tcrctl.loop.safety import SafetyGuard
 from tcrctl.plant.plant import Plant
 from tcrctl.signals import Array, Command, Measurement, StepRecord, Timing
 from tcrctl.trajectory.trajectory import Trajectory, sample_reference
@@ -43,32 +46,78 @@ def in_periods(ahead: Array, period: float) -> Array:
     return np.asarray(np.round(ahead / period, 9))
 
 
-def run_loop(
-    trajectory: Trajectory,
-    estimator: Estimator,
-    controller: Controller,
-    plant: Plant,
-    record: Callable[[StepRecord], None],
-    *,
-    period: float,
-    duration: float,
-    pace: Pace,
-    limits: SafetyLimits,
-) -> None:
-    """Run a trajectory from beginning to end.
+def _discard(step: StepRecord) -> None:
+    """Discard a record."""
 
-    A step that breaks a safety limit holds the drives and is recorded like any other; then the run stops.
 
-    Args:
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What goes round in a loop, how often, at which pace and within which limits.
+
+    Attributes:
         trajectory: What is wanted.
+        plant: Is measured and driven; whoever made it closes it.
         estimator: Finds the state from what is measured and what was applied.
         controller: Finds the command.
-        plant: Is measured and driven; the caller closes it.
-        record: Takes every step.
         period: Control period [s].
-        duration: How long [s].
+        steps: Control steps from beginning to end.
         pace: Lets every step begin when it is due.
-        limits: What must be kept.
+        guard: Says when the run must stop; watches one run.
+        record: Takes every step.
+    """
+
+    trajectory: Trajectory
+    plant: Plant
+    estimator: Estimator
+    controller: Controller
+    period: float
+    steps: int
+    pace: Pace = field(default_factory=Unpaced)
+    guard: SafetyGuard = field(default_factory=SafetyGuard)
+    record: Callable[[StepRecord], None] = _discard
+
+
+class Ticked(NamedTuple):
+    """One step, and why it must be the last one; None if it need not."""
+
+    step: StepRecord
+    broken: SafetyLimitError | None
+
+
+def tick(parts: Parts, k: int, applied: Command | None) -> Ticked:
+    """Do one control step. One that breaks a safety limit holds the drives.
+
+    Args:
+        parts: The loop.
+        k: Index of the step.
+        applied: What was applied in the step before; None in the first one.
+
+    Raises:
+        DivergenceError: If a simulated plant diverged.
+        RunInterruptedError: If a signal asked to stop.
+        DeviceError: If the plant failed.
+    """
+    plant, t, now = parts.plant, k * parts.period, parts.pace.now
+    late, t0 = parts.pace.wait(t), now()
+    measured, truth = plant.read(), plant.truth()
+    t1 = now()
+    estimate = parts.estimator.update(measured, still(measured) if applied is None else applied)
+    t2 = now()
+    ahead = (k + in_periods(parts.controller.ahead, parts.period)) * parts.period
+    reference = sample_reference(parts.trajectory, t, ahead)
+    wanted, info = parts.controller.control(estimate, reference)
+    t3 = now()
+    broken = parts.guard.check(k, reference, estimate, wanted, info)
+    sent = plant.write(still(measured) if broken else wanted)
+    timing = Timing(t1 - t0, t2 - t1, t3 - t2, now() - t3, late)
+    step = StepRecord(k, t, parts.period, reference, measured, estimate, wanted, sent, info, truth, timing)
+    return Ticked(step, broken)
+
+
+def run_loop(parts: Parts) -> None:
+    """Run a loop from beginning to end.
+
+    A step that breaks a safety limit is recorded like any other; then the run stops.
 
     Raises:
         StoppedError: If a limit was broken, or the plant diverged.
@@ -76,24 +125,10 @@ def run_loop(
         DeviceError: If the plant failed.
         LogError: If a step could not be recorded.
     """
-    guard, applied, now = SafetyGuard(limits), None, pace.now
-    ahead = in_periods(controller.ahead, period)
-    for k in range(step_count(duration, period)):
-        late, t0 = pace.wait(k * period), now()
-        measured, truth = plant.read(), plant.truth()
-        t1 = now()
-        estimate = estimator.update(measured, still(measured) if applied is None else applied)
-        t2 = now()
-        reference = sample_reference(trajectory, k * period, (k + ahead) * period)
-        wanted, info = controller.control(estimate, reference)
-        t3 = now()
-        broken = guard.check(k, reference, estimate, wanted, info)
-        applied = plant.write(still(measured) if broken else wanted)
-        timing = Timing(t1 - t0, t2 - t1, t3 - t2, now() - t3, late)
-        record(
-            StepRecord(
-                k, k * period, period, reference, measured, estimate, wanted, applied, info, truth, timing
-            )
-        )
+    applied = None
+    for k in range(parts.steps):
+        step, broken = tick(parts, k, applied)
+        parts.record(step)
         if broken:
             raise broken
+        applied = step.applied

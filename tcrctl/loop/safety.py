@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -25,10 +26,14 @@ class SafetyLimits:
     unsolved: int = 2
 
 
+#: Stops nothing but commands that are no numbers.
+NO_LIMITS: Final = SafetyLimits(np.inf, np.inf, 2**62)
+
+
 class SafetyGuard:
     """Watches the steps of one run."""
 
-    def __init__(self, limits: SafetyLimits) -> None:
+    def __init__(self, limits: SafetyLimits = NO_LIMITS) -> None:
         self._limits, self._unsolved = limits, 0
 
     def check(

@@ -54,7 +54,7 @@ class SimulatedPlant:
         robot = self.robot = _moving(settings, robot)
         self.period, self.time = period, 0.0
         self._pushes, self._dropouts = settings.pushes, settings.dropouts
-        self._step, self._rho = settings.step_ms / 1000.0, settings.spectral_radius
+        self._rule = dynamics.Rule(settings.step_ms / 1000.0, settings.spectral_radius)
         self._latency, self._noise = settings.latency_ms / 1000.0, settings.noise_um * 1e-6
         whole = int(self._latency / period + 1e-9)  # periods; what is left of the latency is within one
         self._late = max(0.0, self._latency - whole * period)
@@ -104,9 +104,8 @@ class SimulatedPlant:
 
     def _advance(self, speed: Array, duration: float, force: Array) -> None:
         converged, residual, smallest, _ = dynamics.advance(
-            self.robot.model, self._state, speed, duration, self._step, self._rho, force, self._work,
-            self._scratch,
-        )  # fmt: skip
+            self.robot.model, self._state, speed, duration, self._rule, force, self._work, self._scratch
+        )
         if not converged:
             raise DivergenceError(self.time, residual, smallest)
 

@@ -21,9 +21,8 @@ from tcrctl.experiment.prepare import Experiment, make_trajectory
 from tcrctl.log.checksums import checksums
 from tcrctl.log.comparison import Comparison, quantities
 from tcrctl.log.reader import Log, read_log
-from tcrctl.loop.loop import run_loop
-from tcrctl.loop.pacing import Unpaced
-from tcrctl.loop.safety import SafetyLimits
+from tcrctl.loop.loop import Parts, tick
+from tcrctl.loop.safety import NO_LIMITS, SafetyGuard
 from tcrctl.plant.recorded import Limits, Recorded, RecordingEndedError
 from tcrctl.plant.stroke import within_stroke
 from tcrctl.replay.environment import Change, changes
@@ -37,6 +36,7 @@ from tcrctl.trajectory.trajectory import Trajectory
 
 Progress = Callable[[int, int | None], None]
 Announce = Callable[[Sequence[Change]], None]
+Record = Callable[[StepRecord], None]
 Watch = Callable[[StepRecord, StepRecord], None]
 
 #: What a plant of each kind makes of a command, where it depends on nothing but the measurement before.
@@ -47,10 +47,6 @@ LIMITS: Final[Mapping[str, Callable[[Robot, float], Limits]]] = {
 }
 #: Parts of a step that are fed to the replay, or measured with a clock.
 GIVEN: Final = ("k", "measurement.", "truth.", "timing.")
-#: Steps that no log has: the recording itself ends the loop.
-_ENDLESS: Final = 2**40
-#: Stops nothing: a changed controller may fail where the recorded one did not, and the replay shall go on.
-NO_LIMITS: Final = SafetyLimits(np.inf, np.inf, 2**62)
 
 
 def _quiet(done: int, total: int | None) -> None:
@@ -136,49 +132,53 @@ class _Session:
         start = recorded.start
         return StartBlend(trajectory, first.reference.position, normal, start.blend_s, start.approach)
 
-    def run(
-        self, record: Callable[[StepRecord], None] | None, progress: Progress
-    ) -> RecordingEndedError | str:
+    def run(self, record: Record | None, progress: Progress) -> RecordingEndedError | str:
         """Replay to the end of the window or of what there is; return why it ended."""
-        experiment = Experiment(self._origin.wanted, self._origin.wanted.spec, self.robot, self._trajectory)
-        total = _total(self._log, self._window)
-
-        def take(step: StepRecord) -> None:
-            recorded, limited = self._plant.step, self._plant.limited
-            replayed = step if limited is None else replace(step, applied=limited)
-            # of the recorded input, which may differ from what it was when it was logged
-            fed = replace(replayed, measurement=recorded.measurement, reference=recorded.reference)
-            replayed = replace(replayed, checksums=checksums(fed))
-            self._done += 1
-            if step.k in self._window:
-                self._comparison.add(recorded, replayed)
-                if self._watch is not None:
-                    self._watch(recorded, replayed)
-                if record is not None:
-                    record(replayed)
+        parts, total, applied = self._parts(), _total(self._log, self._window), None
+        for k in itertools.count():
+            try:
+                step, broken = tick(parts, k, applied)
+            except RecordingEndedError as error:
+                return error
+            except StoppedError as error:
+                return "" if next(self._steps, None) is None else str(error)
+            self._take(step, record)
             progress(self._done, total)
-            if step.k == self._window.last:
-                raise _WindowEnd
+            if k == self._window.last:
+                break
+            if broken is not None:
+                return "" if next(self._steps, None) is None else str(broken)
+            applied = step.applied
+        return ""
 
-        try:
-            run_loop(
-                self._trajectory,
-                self._estimator,
-                self._controller,
-                self._plant,
-                take,
-                period=self._period,
-                duration=_ENDLESS * self._period,
-                pace=Unpaced(),
-                limits=experiment.safety if self._origin.wanted is self._origin.recorded else NO_LIMITS,
-            )
-        except _WindowEnd:
-            return ""
-        except RecordingEndedError as error:
-            return error
-        except StoppedError as error:
-            return "" if next(self._steps, None) is None else str(error)
-        raise AssertionError("a recording has an end")
+    def _parts(self) -> Parts:
+        """Recorded plant and references, rebuilt estimator and controller; a changed one may fail and go on."""
+        experiment = Experiment(self._origin.wanted, self._origin.wanted.spec, self.robot, self._trajectory)
+        limits = experiment.safety if self._origin.wanted is self._origin.recorded else NO_LIMITS
+        return Parts(
+            trajectory=self._trajectory,
+            plant=self._plant,
+            estimator=self._estimator,
+            controller=self._controller,
+            period=self._period,
+            steps=0,  # as many as are recorded
+            guard=SafetyGuard(limits),
+        )
+
+    def _take(self, step: StepRecord, record: Record | None) -> None:
+        """Compare a replayed step with the recorded one, if it lies in the window."""
+        recorded, limited = self._plant.step, self._plant.limited
+        replayed = step if limited is None else replace(step, applied=limited)
+        # of the recorded input, which may differ from what it was when it was logged
+        fed = replace(replayed, measurement=recorded.measurement, reference=recorded.reference)
+        replayed = replace(replayed, checksums=checksums(fed))
+        self._done += 1
+        if step.k in self._window:
+            self._comparison.add(recorded, replayed)
+            if self._watch is not None:
+                self._watch(recorded, replayed)
+            if record is not None:
+                record(replayed)
 
     def result(
         self,
@@ -226,10 +226,6 @@ class _Session:
         if self._kind in LIMITS:
             return ()
         return (f"applied: the limits of plant.kind: {self._kind} are not known here",)
-
-
-class _WindowEnd(Exception):  # noqa: N818  (it ends the loop, nothing is wrong)
-    """The last step that is wanted has been replayed."""
 
 
 def _peeked(steps: Iterator[StepRecord]) -> tuple[Iterator[StepRecord], StepRecord | None]:

@@ -45,6 +45,18 @@ class State(NamedTuple):
     drive: Array
 
 
+class Rule(NamedTuple):
+    """How time is integrated.
+
+    Attributes:
+        step: Largest internal step [s].
+        rho: Spectral radius of (15).
+    """
+
+    step: float
+    rho: float
+
+
 class Scratch(NamedTuple):
     """Arrays of one step: predictors and the load of (*)."""
 
@@ -130,8 +142,7 @@ def advance(
     x: State,
     speed: Array,
     duration: float,
-    step: float,
-    rho: float,
+    rule: Rule,
     external: Array,
     ws: Workspace,
     s: Scratch,
@@ -143,19 +154,18 @@ def advance(
         x: State; on failure it holds the last step that converged.
         speed: Drive speeds u (m,) [m/s].
         duration: Time to advance [s].
-        step: Largest internal step [s].
-        rho: Spectral radius of (15).
+        rule: How time is integrated.
         external: External force, gravity included (3 n_nodes,) [N].
         ws: Workspace; its tensions belong to the state at the end.
         s: Scratch arrays.
 
     Returns:
         (converged, residual [N], smallest step used [s], Newton iterations).
-    """  # fmt: skip
-    done, residual, smallest, halvings, iterations = 0.0, 0.0, step, 0, 0
+    """
+    step, done, residual, smallest, halvings, iterations = rule.step, 0.0, 0.0, rule.step, 0, 0
     while done < duration * (1.0 - 1e-9):
         h = min(step / 2.0**halvings, duration - done)
-        outcome = try_step(model, x, speed, h, rho, external, ws, s)
+        outcome = try_step(model, x, speed, h, rule.rho, external, ws, s)
         iterations += outcome.iterations
         residual = outcome.residual
         if outcome.converged:

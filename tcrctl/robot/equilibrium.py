@@ -64,7 +64,7 @@ def _in_steps(
         q = start.copy()
         for i in range(1, steps + 1):
             drive = drives[0] + (drives[1] - drives[0]) * (i / steps)
-            outcome = Outcome(*minimise(model, q, drive, load, ws, TOLERANCE, MAX_ITERATIONS, True))
+            outcome = minimise(model, q, drive, load, ws, TOLERANCE, MAX_ITERATIONS, True)
             if not outcome.converged:
                 break
         if outcome.converged:
@@ -89,7 +89,7 @@ def equilibrium(
     """
     ws, load = make_workspace(model), static_load(model, external)
     q = np.array(start)
-    outcome = Outcome(*minimise(model, q, drive, load, ws, TOLERANCE, MAX_ITERATIONS, True))
+    outcome = minimise(model, q, drive, load, ws, TOLERANCE, MAX_ITERATIONS, True)
     if not outcome.converged:
         first = np.zeros_like(drive) if start_drive is None else start_drive
         q, outcome = _in_steps(model, start, (first, drive), load, ws)

@@ -17,6 +17,8 @@ predicted tension.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -33,6 +35,18 @@ GAMMA = 1.0 - np.sqrt(0.5)
 POSE_ROWS = 7
 #: A column that keeps less than this part of its length beside the others adds nothing but rounding.
 DEPENDENT = 1e-6
+
+
+class Release(NamedTuple):
+    """How the robot is let go.
+
+    Attributes:
+        offset: Displacement from the point that it will come to rest at (3 n_nodes,) [m].
+        v: Node velocities (3 n_nodes,) [m/s].
+    """
+
+    offset: Array
+    v: Array
 
 
 @njit(cache=True, error_model="numpy")
@@ -150,23 +164,19 @@ def _observe(CV: Array, GV: Array, axial: Array, t: float, x: Array, out: Array)
 def respond(
     model: Model,
     q_eq: Array,
-    offset: Array,
-    v: Array,
-    step: float,
-    steps: int,
+    release: Release,
+    ahead: Array,
     tip: int,
     ws: Workspace,
     V: Array,
 ) -> tuple[Array, bool]:
-    """Changes of end pose and tensions at the times step, 2 step, ... after a state.
+    """Predict changes of end pose and tensions after a state.
 
     Args:
         model: Robot arrays.
         q_eq: Stable equilibrium (3 n_nodes,) [m]; ``ws`` holds K, its factor U and G there.
-        offset: Displacement of the state from the point it will come to rest at (3 n_nodes,) [m].
-        v: Node velocities (3 n_nodes,) [m/s].
-        step: Time between responses [s].
-        steps: Number of responses.
+        release: The state.
+        ahead: Times of the responses after it, equally spaced from 0 (steps,) [s].
         tip: Row of the first node of the tip ring.
         ws: Workspace of the static solve that found ``q_eq``.
         V: Basis (12 n_modules, modes + m), refined by this call; see :func:`start_basis`.
@@ -177,6 +187,7 @@ def respond(
         tangent was positive definite.
     """
     m, r, first = model.cables.shape[0], V.shape[1], 3 * (tip - FIXED)
+    step, steps = ahead[0], ahead.shape[0]
     for c in range(m):
         ws.axial[c] = model.cables[c, STIFFNESS]
     linear.couple(ws, ws.r)
@@ -192,7 +203,7 @@ def respond(
     start, change = np.zeros((POSE_ROWS + m, m + 1)), np.zeros((steps, POSE_ROWS + m, m + 1))
     if not block_banded.factor_diagonal(reduced):
         return change, False
-    _project_state(model.mass, V, offset, v, x, vx)
+    _project_state(model.mass, V, release.offset, release.v, x, vx)
     for i in range(r):
         for c in range(m):
             F[i, c] = -ws.axial[c] * GV[c, i]

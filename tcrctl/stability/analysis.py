@@ -9,24 +9,25 @@ it is a statement about slow trajectories ("frozen time"), exact where the robot
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.controller.inner_map import InnerMap
-from tcrctl.errors import DivergenceError, InputError, StoppedError
-from tcrctl.experiment.prepare import Experiment, Parts, build_parts, build_plant
+from tcrctl.controller.controller import Controller
+from tcrctl.controller.inner_map import InnerMap, Linearisable
+from tcrctl.errors import InputError, StoppedError
+from tcrctl.experiment.prepare import Experiment, build_parts, build_plant
 from tcrctl.loop.interruption import Interruption
-from tcrctl.loop.loop import run_loop
+from tcrctl.loop.loop import Parts, run_loop
 from tcrctl.loop.pacing import Unpaced
 from tcrctl.numerics.spectrum import derivative, largest_eigenvalues
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.signals import Array, StepRecord
 from tcrctl.stability.closed_loop import ClosedLoop, StepMap
 from tcrctl.stability.report import StabilityPoint, StabilityReport
-from tcrctl.trajectory.trajectory import sample_reference
 
 #: Length of a deviation of the loop's state, in the scales of its parts: some tens of micrometres per coordinate.
 #: At standstill the solvers of plant and estimator accept what they have until it is off by their tolerance; with
@@ -82,24 +83,14 @@ def analyse(
         plant.close()
         raise InputError("the stability analysis needs plant.kind: simulated; a robot cannot be copied")
     plant.without_noise()
-    parts = build_parts(experiment, plant, state)
-    parts.controller.sharpen()
-    probe = _Probe(experiment, parts, plant, points, every, progress)
+    parts, _ = build_parts(experiment, plant, state)
+    linearisable(parts.controller).sharpen()
     stopped = ""
     with Interruption() as interruption:
-        pace = Unpaced(interruption.check)
+        parts = replace(parts, pace=Unpaced(interruption.check))
+        probe = _Probe(parts, analysed_steps(experiment.steps, points, every), progress)
         try:
-            run_loop(
-                parts.trajectory,
-                parts.estimator,
-                parts.controller,
-                plant,
-                probe.record,
-                period=experiment.period,
-                duration=parts.trajectory.duration,
-                pace=pace,
-                limits=experiment.safety,
-            )
+            run_loop(replace(parts, record=probe.record))
         except StoppedError as error:
             stopped = str(error)
     spec = experiment.spec
@@ -118,39 +109,27 @@ def analyse(
 class _Probe:
     """Takes the records of a run, and looks at the loop before the steps that were asked for."""
 
-    def __init__(
-        self,
-        experiment: Experiment,
-        parts: Parts,
-        plant: SimulatedPlant,
-        points: int,
-        every: int | None,
-        progress: Progress,
-    ) -> None:
-        self.parts, self._plant, self._progress = parts, plant, progress
-        self._steps, self._period = experiment.steps, experiment.period
-        self._wanted = set(analysed_steps(self._steps, points, every))
+    def __init__(self, parts: Parts, wanted: Sequence[int], progress: Progress) -> None:
+        self._parts, self._wanted, self._progress = parts, frozenset(wanted), progress
         self.points: list[StabilityPoint] = []
         self.states, self.what = 0, ""
 
     def record(self, step: StepRecord) -> None:
         """Take the record of a step; the parts now stand before the next one."""
         if step.k + 1 in self._wanted:
-            loop = ClosedLoop(self._plant, self.parts.estimator, self.parts.controller, step.applied)
-            self.points.append(self._point((step.k + 1) * self._period, loop))
-        self._progress(step.k + 1, self._steps)
+            self.points.append(self._point(ClosedLoop(self._parts, step.k + 1, step.applied)))
+        self._progress(step.k + 1, self._parts.steps)
 
-    def _point(self, t: float, loop: ClosedLoop) -> StabilityPoint:
-        reference = sample_reference(self.parts.trajectory, t, t + loop.controller.ahead)
-        step = StepMap(loop, reference)
+    def _point(self, loop: ClosedLoop) -> StabilityPoint:
+        step, t = StepMap(loop), loop.k * self._parts.period
         self.states = step.size
         unknown = np.full(COUNT, np.nan, dtype=np.complex128)
         try:
             after = step.after(np.zeros(step.size))
             found, converged = spectrum_of(step)
-        except DivergenceError:
+        except StoppedError:
             return StabilityPoint(t, np.nan, unknown, False, False, False)
-        inner = after.loop.controller.inner_map()
+        inner = linearisable(after.loop.parts.controller).inner_map()
         self.what = self.what if inner is None else inner.what
         unknown[: found.size] = found
         info = after.info
@@ -159,11 +138,22 @@ class _Probe:
         )
 
 
+def linearisable(controller: Controller) -> Linearisable:
+    """Return the controller as what a linearisation needs.
+
+    Raises:
+        InputError: If it does not offer that.
+    """
+    if not isinstance(controller, Linearisable):
+        raise InputError("a controller of this kind cannot be linearised")
+    return controller
+
+
 def spectrum_of(step: StepMap) -> tuple[NDArray[np.complex128], bool]:
     """Return the largest eigenvalues (at most COUNT) of a step map, and whether all were found.
 
     Raises:
-        DivergenceError: If the plant's integrator did not converge.
+        StoppedError: If the plant's integrator did not converge, or a command is no number.
     """
     product = derivative(step, step.size, STEP, central=True)
     start = np.random.default_rng(0).standard_normal(step.size)

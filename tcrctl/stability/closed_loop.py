@@ -2,23 +2,23 @@
 
     memory = plant, estimator, controller       x_k+1 = F_k(x_k),  J = ∂F_k/∂x
 
-F_k runs the parts themselves on a copy, so whatever they do is in it: integrator, observer, filters, statics, LCP.
+F_k is the tick of the loop itself on a copy of its parts, so whatever they do is in it: integrator, observer,
+filters, statics, LCP.
 """
 
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from tcrctl.controller.controller import Controller
-from tcrctl.estimator.estimator import Estimator
-from tcrctl.loop.loop import still
+from tcrctl.errors import InputError
+from tcrctl.loop.loop import Parts, tick
+from tcrctl.loop.safety import SafetyGuard
 from tcrctl.memory import Kept, Remembers
-from tcrctl.plant.simulated import SimulatedPlant
-from tcrctl.signals import Array, Command, ControlInfo, Reference
+from tcrctl.signals import Array, Command, ControlInfo
 
 
 @dataclass(slots=True)
@@ -26,39 +26,49 @@ class ClosedLoop:
     """The parts of a loop between two steps.
 
     Attributes:
-        plant: Simulated plant, without noise.
-        estimator: The estimator.
-        controller: The controller.
+        parts: A simulated plant without noise, estimator, controller and trajectory.
+        k: The coming step.
         applied: What the plant was told last; None before the first step.
     """
 
-    plant: SimulatedPlant
-    estimator: Estimator
-    controller: Controller
+    parts: Parts
+    k: int = 0
     applied: Command | None = None
 
-    def step(self, reference: Reference) -> ControlInfo:
-        """One control step, as in :func:`tcrctl.loop.loop.run_loop`.
+    def step(self) -> ControlInfo:
+        """Do the coming control step.
 
         Raises:
-            DivergenceError: If the plant's integrator did not converge.
+            StoppedError: If the plant's integrator did not converge, or the command is no number.
         """
-        measured = self.plant.read()
-        estimate = self.estimator.update(measured, self.applied or still(measured))
-        wanted, info = self.controller.control(estimate, reference)
-        self.applied = self.plant.write(wanted)
-        return info
+        step, broken = tick(self.parts, self.k, self.applied)
+        if broken is not None:
+            raise broken
+        self.k, self.applied = self.k + 1, step.applied
+        return step.info
 
     def kept(self) -> dict[str, Kept]:
-        """Everything that the next step depends on, by ``part.name``."""
-        parts: dict[str, Remembers] = {
-            "plant": self.plant,
-            "estimator": self.estimator,
-            "controller": self.controller,
-        }
-        return {
-            f"{part}.{name}": kept for part, owner in parts.items() for name, kept in owner.memory().items()
-        }
+        """Return everything that the next step depends on, by ``part.name``.
+
+        Raises:
+            InputError: If a part does not tell what it remembers.
+        """
+        parts = self.parts
+        owners = {"plant": parts.plant, "estimator": parts.estimator, "controller": parts.controller}
+        found: dict[str, Kept] = {}
+        for part, owner in owners.items():
+            if not isinstance(owner, Remembers):
+                raise InputError(f"the {part} does not tell what it remembers, so it cannot be linearised")
+            found.update({f"{part}.{name}": kept for name, kept in owner.memory().items()})
+        return found
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> ClosedLoop:
+        """Copy what a step changes, without limits and record; the trajectory never changes."""
+        parts, applied = self.parts, self.applied
+        changing = (parts.plant, parts.estimator, parts.controller, applied)
+        plant, estimator, controller, applied = copy.deepcopy(changing, memo)
+        copied = replace(parts, plant=plant, estimator=estimator, controller=controller, guard=SafetyGuard())
+        return ClosedLoop(copied, self.k, applied)
 
 
 class After(NamedTuple):
@@ -75,40 +85,35 @@ class StepMap:
         size: Number of states n.
     """
 
-    def __init__(self, loop: ClosedLoop, reference: Reference) -> None:
-        """Take a loop between two steps, and what is wanted in the coming one.
-
-        Args:
-            loop: Is copied.
-            reference: The same for every state.
-        """
-        self._loop, self._reference = copy.deepcopy(loop), reference
+    def __init__(self, loop: ClosedLoop) -> None:
+        """Copy a loop between two steps."""
+        self._loop = copy.deepcopy(loop)
         kept = self._loop.kept()
         self._blind = {name: part.blind.copy() for name, part in kept.items() if part.blind is not None}
         self.size = sum(part.values.size for part in kept.values())
 
     def __call__(self, deviation: Array) -> Array:
-        """State one step after the present state + ``deviation``, both (n,)."""
+        """Return the state one step after the present state + ``deviation``, both (n,)."""
         return self._read(self.after(deviation).loop)
 
     def after(self, deviation: Array) -> After:
-        """The loop one step after the present state + ``deviation`` (n,).
+        """Return the loop one step after the present state + ``deviation`` (n,).
 
         Raises:
-            DivergenceError: If the plant's integrator did not converge.
+            StoppedError: If the plant's integrator did not converge, or the command is no number.
         """
         loop, first = copy.deepcopy(self._loop), 0
         for name, part in loop.kept().items():
             change = deviation[first : first + part.values.size]
             np.add(part.values, part.scale * self._seen(name, change), out=part.values)
             first += part.values.size
-        return After(loop, loop.step(self._reference))
+        return After(loop, loop.step())
 
     def _read(self, loop: ClosedLoop) -> Array:
         kept = loop.kept()
         return np.concatenate([self._seen(name, part.values / part.scale) for name, part in kept.items()])
 
     def _seen(self, name: str, values: Array) -> Array:
-        """Values without the part that has no effect: left in, it would be an eigenvalue 1 that means nothing."""
+        """Return values without the part that has no effect, which would be an eigenvalue 1 that means nothing."""
         blind = self._blind.get(name)
         return values if blind is None else values - blind * (blind @ values)

@@ -1,0 +1,108 @@
+"""What all controllers that feed the end pose back have in common, whatever finds their speeds.
+
+reference, estimate -> pose error -> integral shift -+
+estimate -> doubt, speed and stroke limits ----------+-> planner -> plan -> limits -> command
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tcrctl.controller.cost import input_limits, outputs, pose_error
+from tcrctl.controller.inner_map import InnerMap
+from tcrctl.controller.integral import IntegralAction
+from tcrctl.controller.plan import Planner, Situation
+from tcrctl.controller.settings import IocSettings, KinematicSettings
+from tcrctl.memory import SPEED, Kept
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
+
+
+class Shell:
+    """See the module's docstring. A step in doubt, or without a solution, holds the drives.
+
+    Attributes:
+        ahead: Instants after the step at which the planner wants the reference (n,) [s].
+    """
+
+    ahead: Array
+
+    def __init__(self, settings: IocSettings | KinematicSettings, robot: Robot, planner: Planner) -> None:
+        """Put a planner into the shell."""
+        self._settings, self._robot, self._planner = settings, robot, planner
+        self._integral = IntegralAction(settings.integral, settings.period_s)
+        self._normal = robot.rest_normal if settings.output == "pose" else None
+        self._speed = np.zeros(robot.n_cables)
+        self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
+        self.ahead = planner.ahead
+
+    def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
+        """Return the command for the coming period; the drives are held if no trustworthy one was found."""
+        at = self._situation(estimate, reference)
+        plan = self._planner.plan(at)
+        reason = at.doubt or plan.reason
+        self._speed = np.zeros(self._robot.n_cables) if reason else at.within(plan.speed)
+        limit = self._settings.speed_limit_mm_s / 1000.0
+        self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
+        info = ControlInfo(
+            converged=not reason,
+            iterations=plan.iterations,
+            residual=plan.residual,
+            lcp_residual=plan.lcp_residual,
+            lcp_pivots=plan.lcp_pivots,
+            saturated=self._saturated,
+            predicted_tension=plan.tension,
+            integral=at.shift,
+            reason=reason,
+        )
+        return Command(self._speed, estimate.drive + self._settings.period_s * self._speed), info
+
+    def _situation(self, estimate: Estimate, reference: Reference) -> Situation:
+        """Move the integral action on, and gather what the planner is told."""
+        planner = self._planner
+        age = reference.t - estimate.t if planner.extrapolates else 0.0
+        now = outputs(estimate, age, self._robot)
+        error = pose_error(reference, now[:3], now[3:6])
+        self._normal = now[3:6].copy() if self._settings.output == "pose" else None
+        stands = planner.anti_windup and bool(self._saturated.any())
+        shift = self._integral.update(error, stands)
+        low, high = input_limits(self._settings, self._robot, estimate.drive, planner.blocks)
+        return Situation(
+            estimate=estimate,
+            reference=reference,
+            age=age,
+            outputs=now,
+            error=error,
+            shift=shift,
+            previous=self._speed,
+            low=low,
+            high=high,
+            doubt=_doubt(estimate),
+        )
+
+    def sharpen(self) -> None:
+        """Let the planner solve to rounding."""
+        self._planner.sharpen()
+
+    def memory(self) -> Mapping[str, Kept]:
+        """Return the last input, the integral action, and what the planner keeps."""
+        return {
+            "speed": Kept(self._speed, SPEED),
+            **self._integral.memory(self._normal),
+            **self._planner.memory(),
+        }
+
+    def inner_map(self) -> InnerMap | None:
+        """Return the planner's iteration."""
+        return self._planner.inner_map()
+
+
+def _doubt(estimate: Estimate) -> str:
+    """Return why no command can be built on an estimate; empty if one can."""
+    if not estimate.converged:
+        return "the estimator's step did not converge"
+    if not np.isfinite(estimate.q).all():
+        return "the estimate is not finite"
+    return ""
