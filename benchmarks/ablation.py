@@ -26,23 +26,23 @@ PLANTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "cone_frustum, stiff plant": ("cone_frustum", STIFF),
     "dynamic_10s": ("dynamic_10s", ()),
 }
-LITERAL = ("prediction=literal", "horizon_s=0.05", "tension=off", "integral=off")
+LITERAL = ("prediction=literal", "tension=off", "integral=off")
 CHANGES: dict[str, tuple[str, ...]] = {
     "as shipped": (),
     "`integral=off`": ("integral=off",),
-    "`offset=off`": ("offset=off",),
-    "both off": ("integral=off", "offset=off"),
+    "`offset=off`": ("prediction.offset=off",),
+    "both off": ("integral=off", "prediction.offset=off"),
     "`tension=off`": ("tension=off",),
-    "`offset.filter_s=0.1`": ("offset.filter_s=0.1",),
-    "`offset.filter_s=1`": ("offset.filter_s=1.0",),
+    "`offset.filter_s=0.1`": ("prediction.offset.filter_s=0.1",),
+    "`offset.filter_s=1`": ("prediction.offset.filter_s=1.0",),
     "`weights.speed_change=220`": ("weights.speed_change=220.0",),
     "`weights.speed_change=3.5e3`": ("weights.speed_change=3500.0",),
     "`weights.speed_change=3.5e4`": ("weights.speed_change=35000.0",),
-    "`horizon_s=0.4`": ("horizon_s=0.4",),
-    "`horizon_s=1.2`": ("horizon_s=1.2",),
-    "`blocks=1`": ("blocks=1",),
+    "`horizon_s=0.4`": ("prediction.horizon_s=0.4",),
+    "`horizon_s=1.2`": ("prediction.horizon_s=1.2",),
+    "`blocks=1`": ("prediction.blocks=1",),
     "`model=static`": ("model=static",),
-    "`prediction=one_step`, `horizon_s=0.4`": ("prediction=one_step", "horizon_s=0.4"),
+    "`one_step`, `horizon_s=0.4`": ("prediction={kind: one_step, horizon_s: 0.4}",),
     "`prediction=literal`, as printed": LITERAL,
 }
 

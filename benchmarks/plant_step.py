@@ -44,12 +44,12 @@ def run(robot: Robot, seconds: float, step: float) -> tuple[Array, Array]:
     model, m = robot.model, robot.n_cables
     state = dynamics.rest_state(robot.rest.q, np.zeros(m))
     work, scratch = make_workspace(model), dynamics.make_scratch(model)
-    times, iterations = [], []
-    dynamics.advance(model, state, np.zeros(m), step, step, RHO, robot.weight, work, scratch)  # compile
+    times, iterations, rule = [], [], dynamics.Rule(step, RHO)
+    dynamics.advance(model, state, np.zeros(m), step, rule, robot.weight, work, scratch)  # compile
     for k in range(round(seconds / step)):
         speed = speeds(k * step, m)
         begin = time.perf_counter()
-        done = dynamics.advance(model, state, speed, step, step, RHO, robot.weight, work, scratch)
+        done = dynamics.advance(model, state, speed, step, rule, robot.weight, work, scratch)
         times.append(1e6 * (time.perf_counter() - begin))
         iterations.append(done[3])
         if not done[0]:

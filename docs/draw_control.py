@@ -30,7 +30,7 @@ FIGURES = {
         20.0,
         {
             "as shipped": (),
-            "offset off": ("controller.offset=off",),
+            "offset off": ("controller.prediction.offset=off",),
             "W / 16": ("controller.weights.speed_change=220.0",),
         },
     ),
@@ -39,7 +39,7 @@ FIGURES = {
         (),
         "error",
         10.0,
-        {"as shipped": (), "no feedforward": ("controller.feedforward=false",)},
+        {"as shipped": (), "no feedforward": ("controller.prediction.feedforward=false",)},
     ),
 }
 

@@ -63,7 +63,7 @@ def replay(
 
     Examples:
       tcrctl replay logs/20261122-061500Z_letter_t_7f3a/log.mcap
-      tcrctl replay log.mcap --set controller.horizon_s=1.0 --plot longer.png
+      tcrctl replay log.mcap --set controller.prediction.horizon_s=1.0 --plot longer.png
       tcrctl replay log.mcap --from 100 --to 200 --rtol 1e-9 --json
     """
     from tcrctl.experiment.compilation import announced_compilation

@@ -21,7 +21,7 @@ def validate(
 
     Examples:
       tcrctl validate my_experiment.yaml
-      tcrctl validate letter_t --set controller.horizon_s=0.3
+      tcrctl validate letter_t --set controller.prediction.horizon_s=0.3
       tcrctl validate identify_table2
       tcrctl validate --robot my_robot.yaml
     """

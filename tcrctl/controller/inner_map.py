@@ -10,7 +10,7 @@ import numpy as np
 from tcrctl.memory import Remembers
 from tcrctl.robot import linear
 from tcrctl.robot.equations import Load, assemble, make_workspace
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
 

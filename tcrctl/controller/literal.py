@@ -25,7 +25,7 @@ from tcrctl.numerics.generalized_alpha import coefficients
 from tcrctl.robot import dynamics, linear, pose
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, assemble, make_workspace
 from tcrctl.robot.equilibrium import static_load
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array

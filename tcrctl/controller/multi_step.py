@@ -28,7 +28,8 @@ from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, pose, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
-from tcrctl.robot.model import FIXED, Model
+from tcrctl.robot.model import Model
+from tcrctl.robot.module import FIXED, SIZE
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.robot.robot import Robot
 from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, StaticMap, follow, rest_map
@@ -58,9 +59,9 @@ def _update_offset(
     """Filter the displacement of the point that the robot vibrates about: δ + K^-1 M (a + α v)."""
     force, lag = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
     for k in range(force.shape[0]):
-        i, row = k // 12, k % 12
-        for b in range(12):
-            j = 12 * (i + 1) + b
+        i, row = k // SIZE, k % SIZE
+        for b in range(SIZE):
+            j = SIZE * (i + 1) + b
             force[k] += model.mass[i, row, b] * ((v[j] - memory.v[j]) / period + model.damping * v[j])
     linear.solve(ws, force, lag)
     for k in range(force.shape[0]):

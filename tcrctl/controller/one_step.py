@@ -18,7 +18,7 @@ from tcrctl.controller.settings import OneStepSettings
 from tcrctl.memory import Kept
 from tcrctl.robot import dynamics, linear, pose
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, make_workspace
-from tcrctl.robot.model import FIXED
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.potential import minimise
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot

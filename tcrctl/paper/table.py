@@ -33,9 +33,8 @@ STATIC: Final = {
 KINEMATIC: Final = Run("fixed_point_rotation", ("controller={kind: kinematic, output: pose}",))
 LITERAL: Final = Run(
     "letter_t",
-    ("controller.prediction=literal", "controller.horizon_s=0.05", "controller.tension=off",
-     "controller.integral=off"),
-)  # fmt: skip
+    ("controller.prediction=literal", "controller.tension=off", "controller.integral=off"),
+)
 TWO_SEGMENTS: Final = (FIXED, CONE, HELIX, *DYNAMIC.values(), LASER, SCAN)
 
 POSITION: Final = worst("position_error_mm.max")

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from tcrctl.elements import bar, sliding_cable, torus
 from tcrctl.robot.description import RobotDescription, cable_routes, spring_list
-from tcrctl.robot.module import FIXED as FIXED
 from tcrctl.robot.module import (
     NODES,
     RIGID_BARS,

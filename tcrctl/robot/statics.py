@@ -16,7 +16,8 @@ from tcrctl.elements.sliding_cable import STIFFNESS
 from tcrctl.robot import linear, pose
 from tcrctl.robot.equations import Load, Workspace
 from tcrctl.robot.equilibrium import TOLERANCE as _ROUNDING
-from tcrctl.robot.model import FIXED, Model
+from tcrctl.robot.model import Model
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot

@@ -161,17 +161,18 @@ def test_superposed_ramps_are_the_response_to_block_speeds():
 def test_the_forecast_is_what_the_robot_then_does(tcr700):
     """Multi-step prediction against the nonlinear simulation for small piecewise constant speeds."""
     settings = pose_settings()
-    predictor = MultiStep(settings, tcr700)
+    prediction = settings.prediction
+    predictor = MultiStep(prediction, settings.period_s, tcr700)
     rng = np.random.default_rng(5)
-    U = 0.004 * rng.standard_normal((settings.blocks, 6))
+    U = 0.004 * rng.standard_normal((prediction.blocks, 6))
     forecast = predictor.predict(rest := resting(tcr700), 0.0, outputs(rest, 0.0, tcr700), np.zeros(6))
     predicted = forecast.prediction.free + forecast.prediction.gain @ U.ravel()
     state = dynamics.rest_state(tcr700.rest.q, np.zeros(6))
     ws, scratch = make_workspace(tcr700.model), dynamics.make_scratch(tcr700.model)
-    speeds = np.repeat(U, np.diff(block_edges(settings.instants, settings.blocks)), axis=0)
-    actual = []
+    speeds = np.repeat(U, np.diff(block_edges(prediction.instants, prediction.blocks)), axis=0)
+    actual, rule = [], dynamics.Rule(step=1e-3, rho=0.8)
     for speed in speeds:
-        dynamics.advance(tcr700.model, state, speed, 0.05, 1e-3, 0.8, tcr700.weight, ws, scratch)
+        dynamics.advance(tcr700.model, state, speed, 0.05, rule, tcr700.weight, ws, scratch)
         actual.append(np.concatenate([pose.position(state.q, tcr700.tip), pose.normal(state.q, tcr700.tip)]))
     moved = np.array(actual) - np.concatenate([tcr700.rest_position, tcr700.rest_normal])
     error = np.array(actual) - predicted[:, :6]

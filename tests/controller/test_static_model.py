@@ -21,11 +21,11 @@ from tcrctl.robot.response import POSE_ROWS
 
 
 def static(robot, estimate, **changes):
-    """Forecast of the static model for an estimate (blocks as shipped), and its settings."""
+    """Forecast of the static model for an estimate (blocks as shipped), and the settings of its prediction."""
     settings = pose_settings(prediction="static", **changes)
-    predictor = Static(settings, robot)
+    predictor = Static(settings.prediction, settings.period_s, robot)
     forecast = predictor.predict(estimate, 0.0, outputs(estimate, 0.0, robot), np.zeros(robot.n_cables))
-    return forecast, settings
+    return forecast, settings.prediction
 
 
 def pose_at(robot, q):

@@ -74,18 +74,21 @@ def test_an_override_takes_part_in_every_check_and_is_remembered(tmp_path: Path)
     ("overrides", "message"),
     [
         (
-            ["controller.horizon_s=0.01"],
-            "--set controller.horizon_s: must be at least period_s, 0.05, not 0.01",
+            ["controller.prediction.horizon_s=0.01"],
+            "--set controller.prediction.horizon_s: must be at least period_s, 0.05, not 0.01",
         ),
         (
             ["controller.period_s=1"],
-            "/standing.yaml:4:1: controller.horizon_s: must be at least period_s, 1, not 0.8",
+            "/standing.yaml:4:1: controller.prediction.horizon_s: must be at least period_s, 1, not 0.8",
         ),
         (
-            ["controller.instants=8", "controller.blocks=9"],
-            "--set controller.blocks: must be at most instants, 8, not 9",
+            ["controller.prediction.instants=8", "controller.prediction.blocks=9"],
+            "--set controller.prediction.blocks: must be at most instants, 8, not 9",
         ),
-        (["controller.instants=61"], "--set controller.instants: must be <= 60, not 61"),
+        (
+            ["controller.prediction.instants=61"],
+            "--set controller.prediction.instants: must be <= 60, not 61",
+        ),
         (["controller.speed_limit_mm_s=0"], "--set controller.speed_limit_mm_s: must be > 0.0, not 0"),
         (
             ["controller.weights.normal=1"],
@@ -105,6 +108,31 @@ def test_an_override_takes_part_in_every_check_and_is_remembered(tmp_path: Path)
         (
             ["controller.model=static", "controller.prediction=one_step"],
             "--set controller.prediction: one_step is a time step of the equations of motion",
+        ),
+        (
+            ["controller.model=static", "controller.prediction.modes=6"],
+            "--set controller.prediction.modes: has no meaning with model: static",
+        ),
+        (
+            ["controller.prediction={kind: literal, horizon_s: 0.05}"],
+            "controller.prediction.horizon_s: unknown key; allowed: kind",
+        ),
+        (
+            ["controller.prediction={kind: one_step, blocks: 2}"],
+            "unknown key; allowed: kind, horizon_s",
+        ),
+        (
+            ["controller.prediction=litteral"],
+            "must be one of 'multi_step', 'one_step', 'literal', not \"litteral\"; did you mean literal?",
+        ),
+        (
+            ["controller.horizon_s=0.4"],
+            "--set controller.horizon_s: belongs to prediction: write prediction: {kind: multi_step, "
+            "horizon_s: ...}; kinds that have it: multi_step, one_step",
+        ),
+        (
+            ["controller.prediction=literal", "controller.modes=4"],
+            "--set controller.modes: belongs to prediction: write prediction: {kind: multi_step, modes: ...}",
         ),
         (
             ["controller.kind=open_lop"],

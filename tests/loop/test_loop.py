@@ -11,9 +11,9 @@ import pytest
 from support.loop_fakes import CABLES, PERIOD, Clock, FakeController, FakeEstimator, FakePlant, StraightLine
 from tcrctl.errors import DeviceError, RunInterruptedError, SafetyLimitError, StoppedError
 from tcrctl.loop.interruption import Interruption, signals_exit
-from tcrctl.loop.loop import run_loop, step_count
+from tcrctl.loop.loop import Parts, run_loop, step_count, tick
 from tcrctl.loop.pacing import LONGEST_NAP, RealTime, Unpaced
-from tcrctl.loop.safety import SafetyLimits
+from tcrctl.loop.safety import SafetyGuard, SafetyLimits
 
 LIMITS = SafetyLimits(position_error=0.06, tension=60.0)
 
@@ -21,17 +21,20 @@ LIMITS = SafetyLimits(position_error=0.06, tension=60.0)
 def loop(plant=None, estimator=None, controller=None, *, pace=None, record=None, duration=1.0, limits=LIMITS):
     """Run the loop with fakes where nothing else is given; returns the records, also of a loop that raised."""
     records = []
-    parts = (estimator or FakeEstimator(), controller or FakeController(), plant or FakePlant())
     error = None
     try:
         run_loop(
-            StraightLine(),
-            *parts,
-            record or records.append,
-            period=PERIOD,
-            duration=duration,
-            pace=pace or Unpaced(),
-            limits=limits,
+            Parts(
+                trajectory=StraightLine(),
+                plant=plant or FakePlant(),
+                estimator=estimator or FakeEstimator(),
+                controller=controller or FakeController(),
+                period=PERIOD,
+                steps=step_count(duration, PERIOD),
+                pace=pace or Unpaced(),
+                guard=SafetyGuard(limits),
+                record=record or records.append,
+            )
         )
     except StoppedError as stopped:
         error = stopped
@@ -80,6 +83,20 @@ def test_a_step_measures_then_writes():
     plant = FakePlant()
     loop(plant)
     assert plant.calls == ["read", "truth", "write"] * 20
+
+
+def test_the_loop_is_one_tick_after_the_other():
+    """A tick knows nothing of the ones before but what was applied; so stability and replay can use it alone."""
+    records, _ = loop()
+    parts = Parts(StraightLine(), FakePlant(), FakeEstimator(), FakeController(), PERIOD, steps=0)
+    applied = None
+    for k, record in enumerate(records):
+        step, broken = tick(parts, k, applied)
+        applied = step.applied
+        assert broken is None
+        assert (step.k, step.t) == (record.k, record.t)
+        np.testing.assert_array_equal(applied.speed, record.applied.speed)
+        np.testing.assert_array_equal(step.reference.ahead_position, record.reference.ahead_position)
 
 
 def test_an_error_of_the_plant_ends_the_loop_at_once():

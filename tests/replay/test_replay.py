@@ -31,8 +31,8 @@ VARIANTS = {
     "full": (),
     "often_flushed": ("log.flush_steps=10", "log.flush_s=0.1"),
     "lean": ("log.full_state_s=0.5",),
-    "literal": ("controller.prediction=literal", "controller.horizon_s=0.05", "controller.integral=off"),
-    "one_step": ("controller.prediction=one_step", "controller.horizon_s=0.4"),
+    "literal": ("controller.prediction=literal", "controller.integral=off"),
+    "one_step": ("controller.prediction={kind: one_step, horizon_s: 0.4}",),
     "exact": ("estimator={kind: exact}", "log.full_state_s=0.5"),
     "two_rings": ("plant.measured_rings=[4, 8, 11]",),
     "saturated": ("controller.speed_limit_mm_s=4",),
@@ -240,7 +240,7 @@ def test_what_if_tells_how_far_every_quantity_differs_and_writes_a_log(logs, tmp
 
 
 def test_a_longer_horizon_gets_its_references_from_the_trajectory(logs):
-    found = replay(logs("full"), overrides=["controller.horizon_s=0.9"])
+    found = replay(logs("full"), overrides=["controller.prediction.horizon_s=0.9"])
     fields = {item.field: item for item in found.deviations}
     assert found.status == "different"
     assert fields["reference.ahead_position"].largest < 0.01

@@ -15,5 +15,5 @@ def test_what_if_on_a_log_whose_trajectory_goes_to_a_target(tmp_path, capsys):
     summary = run_experiment(prepare(load_spec("laser_pipe", BELOW)), out=tmp_path)
     assert main(["replay", str(summary.log), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["status"] == "identical"
-    assert main(["replay", str(summary.log), "--json", "--set", "controller.horizon_s=1.0"]) == 3
+    assert main(["replay", str(summary.log), "--json", "--set", "controller.prediction.horizon_s=1.0"]) == 3
     assert json.loads(capsys.readouterr().out)["status"] == "different"

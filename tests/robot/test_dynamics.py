@@ -38,8 +38,9 @@ class Motion:
 
     def advance(self, speed, duration, step=1e-3):
         """Advance; returns (converged, residual, smallest step, iterations)."""
+        rule = dynamics.Rule(step, self.rho)
         return dynamics.advance(
-            self.model, self.state, speed, duration, step, self.rho, self.weight, self.work, self.scratch
+            self.model, self.state, speed, duration, rule, self.weight, self.work, self.scratch
         )
 
     def branch(self, rho):

@@ -21,6 +21,11 @@ def robot(request):
     return request.getfixturevalue(request.param)
 
 
+def instants(step, steps):
+    """Times of responses (steps,) [s]."""
+    return step * np.arange(1.0, steps + 1.0)
+
+
 class Bent:
     """A robot at a bent, taut equilibrium, with the basis of its response."""
 
@@ -43,10 +48,8 @@ class Bent:
         change, stable = response.respond(
             self.model,
             self.rest.q,
-            offset,
-            v,
-            step,
-            steps,
+            response.Release(offset, v),
+            instants(step, steps),
             self.robot.tip,
             self.workspace(),
             self.basis.copy(),
@@ -64,10 +67,10 @@ class Bent:
         x.v[:] = v
         work, scratch = make_workspace(self.model), dynamics.make_scratch(self.model)
         before, out = self.outputs(self.rest.q, self.rest.tension), []
+        rule = dynamics.Rule(step=5e-4, rho=0.8)
         for _ in range(steps):
-            assert dynamics.advance(self.model, x, speed, step, 5e-4, 0.8, self.robot.weight, work, scratch)[
-                0
-            ]
+            moved = dynamics.advance(self.model, x, speed, step, rule, self.robot.weight, work, scratch)
+            assert moved[0]
             out.append(self.outputs(x.q, work.tension) - before)
         return np.array(out)
 
@@ -172,8 +175,9 @@ def test_a_slack_cable_keeps_its_authority_over_its_predicted_tension(tcr700):
     ws = bent.workspace()
     ws.axial[1] = 0.0  # as if cable 2 were slack
     still = np.zeros_like(bent.rest.q)
+    release, ahead = response.Release(still, still), instants(0.02, 5)
     change, stable = response.respond(
-        bent.model, bent.rest.q, still, still, 0.02, 5, tcr700.tip, ws, bent.basis.copy()
+        bent.model, bent.rest.q, release, ahead, tcr700.tip, ws, bent.basis.copy()
     )
     assert stable
     assert change[-1, 7 + 1, 1] > 0.0

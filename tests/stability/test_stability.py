@@ -16,15 +16,20 @@ from support.closed_loop import KINDS, constant, ioc, resting, settings_of
 from support.short_runs import arguments
 from tcrctl.cli.app import main
 from tcrctl.controller.controller import build_controller
-from tcrctl.controller.inner_map import newton_map
+from tcrctl.controller.inner_map import Linearisable, newton_map
+from tcrctl.controller.literal import LiteralIoc
 from tcrctl.controller.settings import CostWeights
+from tcrctl.controller.shell import Shell
+from tcrctl.errors import InputError
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.settings import ExactSettings, PassiveObserverSettings
+from tcrctl.loop.loop import Parts
 from tcrctl.memory import Kept
 from tcrctl.plant.settings import Mismatch, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot.equilibrium import static_load
-from tcrctl.stability.analysis import analysed_steps, inner_radius, spectrum_of
+from tcrctl.signals import Command
+from tcrctl.stability.analysis import analysed_steps, inner_radius, linearisable, spectrum_of
 from tcrctl.stability.closed_loop import ClosedLoop, StepMap
 from tcrctl.stability.report import StabilityPoint, StabilityReport
 
@@ -38,7 +43,12 @@ class LinearPlant:
         self.A, self.B, self.x = A, B, np.ones(len(A))
 
     def read(self):
-        return SimpleNamespace(x=self.x.copy(), drive=np.zeros(1))
+        return SimpleNamespace(
+            x=self.x.copy(), drive=np.zeros(1), position=np.zeros(3), tension=np.zeros(1), converged=True
+        )
+
+    def truth(self):
+        return None
 
     def write(self, command):
         self.x = self.A @ self.x + self.B @ command.speed
@@ -51,16 +61,33 @@ class LinearPlant:
 class LinearController:
     """u = -K x - w with the integral w+ = w + x_0, and something kept that nothing depends on."""
 
+    ahead = np.ones(1)
+
     def __init__(self, K):
         self.K, self.w, self.idle = K, np.zeros(1), np.array([1.0, 2.0])
 
     def control(self, estimate, reference):
         u = -self.K @ estimate.x - self.w
         self.w = self.w + estimate.x[:1]
-        return SimpleNamespace(speed=u), None
+        return Command(u, np.zeros(1)), SimpleNamespace(converged=True, reason="")
 
     def memory(self):
         return {"w": Kept(self.w, 0.5), "idle": Kept(self.idle, 1.0, blind=np.array([0.6, 0.8]))}
+
+
+class Standing:
+    """A trajectory that stays where it is."""
+
+    duration = 1.0
+
+    def __init__(self, position, normal):
+        self._position, self._normal = position, normal
+
+    def position(self, t):
+        return np.tile(self._position, (len(t), 1))
+
+    def normal(self, t):
+        return np.tile(self._normal, (len(t), 1))
 
 
 class Through:
@@ -77,8 +104,9 @@ class Through:
 def test_the_radius_of_a_linear_loop_is_exact(gain):
     A, B = np.array([[1.0, 0.1], [-0.2, 0.95]]), np.array([[0.0], [0.1]])
     K = gain * np.array([[1.0, 1.0]])
-    loop = ClosedLoop(LinearPlant(A, B), Through(), LinearController(K))
-    found, converged = spectrum_of(StepMap(loop, None))
+    still = Standing(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    parts = Parts(still, LinearPlant(A, B), Through(), LinearController(K), period=1.0, steps=1)
+    found, converged = spectrum_of(StepMap(ClosedLoop(parts)))
     whole = np.block([[A - B @ K, -B], [np.array([[1.0, 0.0, 1.0]])]])
     # of the two idle numbers one direction is declared without effect, the other stays: eigenvalues 0 and 1
     expected = np.sort(np.abs(np.append(np.linalg.eigvals(whole), [0.0, 1.0])))[::-1]
@@ -87,7 +115,7 @@ def test_the_radius_of_a_linear_loop_is_exact(gain):
 
 
 def real_loop(robot, settings, steps, offset=(0.01, 0.0, 0.02), exact=False, mismatch=MISMATCH):
-    """A loop of the robot's own parts on its way to a target, and the target."""
+    """A loop of the robot's own parts on its way to a target."""
     plant = SimulatedPlant(
         SimulatedSettings(kind="simulated", step_ms=2.5, mismatch=mismatch, latency_ms=10.0),
         robot,
@@ -97,56 +125,67 @@ def real_loop(robot, settings, steps, offset=(0.01, 0.0, 0.02), exact=False, mis
     plant.without_noise()
     kind = ExactSettings(kind="exact") if exact else PassiveObserverSettings(kind="passive_observer")
     estimator = build_estimator(kind, robot, settings.period_s, plant.state)
-    loop = ClosedLoop(plant, estimator, build_controller(settings, robot))
-    for k in range(steps):
-        loop.step(constant(robot, loop.controller, offset, k * settings.period_s))
-    return loop, constant(robot, loop.controller, offset, steps * settings.period_s)
+    target = Standing(robot.rest_position + np.array(offset), robot.rest_normal)
+    controller = build_controller(settings, robot)
+    loop = ClosedLoop(Parts(target, plant, estimator, controller, settings.period_s, steps))
+    for _ in range(steps):
+        loop.step()
+    return loop
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_loop_that_is_given_the_memory_of_another_goes_on_like_it(tcr600, kind):
     """So nothing that matters is left out of the memory."""
     settings = settings_of(kind)
-    older, _ = real_loop(tcr600, settings, 15)
+    older = real_loop(tcr600, settings, 15)
     newer = copy.deepcopy(older)
-    for k in range(15, 20):
-        reference = constant(tcr600, newer.controller, (0.01, 0.0, 0.02), k * settings.period_s)
-        newer.step(reference)
-    older.plant.time, older.applied = newer.plant.time, newer.applied
-    before = StepMap(older, reference)(np.zeros(StepMap(older, reference).size))
+    for _ in range(5):
+        newer.step()
+    older.parts.plant.time, older.k, older.applied = newer.parts.plant.time, newer.k, newer.applied
+    before = StepMap(older)(np.zeros(StepMap(older).size))
     for name, part in older.kept().items():
         part.values[...] = newer.kept()[name].values
-    one, other = (StepMap(loop, reference)(np.zeros(before.size)) for loop in (older, newer))
+    one, other = (StepMap(loop)(np.zeros(before.size)) for loop in (older, newer))
     assert np.linalg.norm(one - other) < 2e-3 * np.linalg.norm(before - other)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_can_be_linearised(tcr600, kind):
+    assert isinstance(build_controller(settings_of(kind), tcr600), Linearisable)
+
+
+def test_a_controller_that_only_controls_is_refused():
+    with pytest.raises(InputError, match="cannot be linearised"):
+        linearisable(LinearController(np.eye(1)))
 
 
 def test_a_copied_loop_is_whole(tcr5x4):
     """The exact estimator of a copy looks at the plant of the copy."""
-    loop, reference = real_loop(tcr5x4, settings_of("kinematic"), 3, exact=True)
-    step = StepMap(loop, reference)
-    moved = copy.deepcopy(loop)
+    loop = real_loop(tcr5x4, settings_of("kinematic"), 3, exact=True)
+    step = StepMap(loop)
+    moved, plant = copy.deepcopy(loop).parts, loop.parts.plant
     moved.plant.memory()["q"].values[...] += 1e-3
     assert moved.estimator.update(moved.plant.read(), None).q[20] == moved.plant.state()[0][20]
-    before = loop.plant.state()[0]
+    before = plant.state()[0]
     assert moved.plant.state()[0][20] == pytest.approx(before[20] + 1e-3)
     assert np.array_equal(step(np.zeros(step.size)), step(np.zeros(step.size)))
-    assert np.array_equal(loop.plant.state()[0], before)
+    assert np.array_equal(plant.state()[0], before)
 
 
 @pytest.mark.parametrize(("gain", "unstable", "push"), [(0.3, False, 1e-3), (2.0, True, 1e-6)])
 def test_a_small_push_grows_or_fades_as_the_radius_says(tcr5x4, gain, unstable, push):
     settings = settings_of("kinematic", gain_1_s=gain)
-    loop, reference = real_loop(tcr5x4, settings, 10, offset=(0.0, 0.0, 0.0), mismatch=None)
-    found, converged = spectrum_of(StepMap(loop, reference))
+    loop = real_loop(tcr5x4, settings, 10, offset=(0.0, 0.0, 0.0), mismatch=None)
+    found, converged = spectrum_of(StepMap(loop))
     radius = abs(found[0])
     assert converged
     assert (radius > 1.0) == unstable
     twin, distance = copy.deepcopy(loop), []
-    depth = twin.plant.memory()["q"].values.reshape(-1, 3)[:, 2]
-    twin.plant.memory()["v"].values.reshape(-1, 3)[:, :2] += push * depth[:, None]
+    depth = twin.parts.plant.memory()["q"].values.reshape(-1, 3)[:, 2]
+    twin.parts.plant.memory()["v"].values.reshape(-1, 3)[:, :2] += push * depth[:, None]
     for _ in range(300):
-        loop.step(reference)
-        twin.step(reference)
+        loop.step()
+        twin.step()
         pairs = zip(loop.kept().values(), twin.kept().values(), strict=True)
         distance.append(np.sqrt(sum(np.sum(((a.values - b.values) / a.scale) ** 2) for a, b in pairs)))
     size = np.log(distance).reshape(-1, 50).mean(axis=1)  # over periods of the slow mode, so its pulse is out
@@ -155,28 +194,31 @@ def test_a_small_push_grows_or_fades_as_the_radius_says(tcr5x4, gain, unstable, 
 
 def test_the_shipped_controller_is_stable_and_the_literal_one_is_not(tcr700):
     weights = CostWeights(position=7.2e4, normal=44.0, twist=1e-3)
-    shipped, reference = real_loop(tcr700, ioc(output="pose", weights=weights), 40)
-    found, converged = spectrum_of(StepMap(shipped, reference))
+    shipped = real_loop(tcr700, ioc(output="pose", weights=weights), 40)
+    found, converged = spectrum_of(StepMap(shipped))
     assert converged
     assert abs(found[0]) < 0.9999
     settings = ioc("literal", output="pose", weights=weights, integral="off", tension="off")
-    literal, reference = real_loop(tcr700, settings, 40)
-    found, _ = spectrum_of(StepMap(literal, reference))
+    literal = real_loop(tcr700, settings, 40)
+    found, _ = spectrum_of(StepMap(literal))
     assert abs(found[0]) > 1.005
-    after = StepMap(literal, reference).after(np.zeros(StepMap(literal, reference).size))
-    assert inner_radius(after.loop.controller.inner_map()) < 0.5  # and (42) does not notice
+    after = StepMap(literal).after(np.zeros(StepMap(literal).size))
+    assert inner_radius(after.loop.parts.controller.inner_map()) < 0.5  # and (42) does not notice
 
 
 def test_the_literal_iteration_has_the_eigenvalues_of_its_inputs_alone(tcr600):
     """At the solution (28) moves q by ξ2 du and nothing else, so (42) is ∂u/∂z along the columns of ξ2: m by m."""
-    controller = build_controller(ioc("literal", integral="off", tension="off"), tcr600)
+    settings = ioc("literal", integral="off", tension="off")
+    planner = LiteralIoc(settings, tcr600)
+    controller = Shell(settings, tcr600, planner)
     _, info = controller.control(resting(tcr600), constant(tcr600, controller, (0.02, 0.01, 0.03)))
     assert info.converged
     inner = controller.inner_map()
-    h, base, step = 0.05, inner.point, 1e-8
+    period, base, step = 0.05, inner.point, 1e-8
     inner.apply(base)  # leaves ∂q/∂d there
     ways = [
-        np.concatenate([h * column, unit]) for column, unit in zip(controller._gain.T, np.eye(3), strict=True)
+        np.concatenate([period * column, unit])
+        for column, unit in zip(planner.gain.T, np.eye(3), strict=True)
     ]
     answers = [inner.apply(base + step * way) - inner.apply(base - step * way) for way in ways]
     reduced = np.stack([answer[-3:] / (2.0 * step) for answer in answers], axis=1)

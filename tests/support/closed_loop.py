@@ -14,11 +14,11 @@ from tcrctl.signals import Command, Estimate, Reference
 
 #: Keys of ``controller:`` for every way to predict.
 PREDICTIONS = {
-    "multi_step": {"prediction": "multi_step", "horizon_s": 0.8},
-    "one_step": {"prediction": "one_step", "horizon_s": 0.4},
-    "literal": {"prediction": "literal", "horizon_s": 0.05},
-    "static": {"prediction": "multi_step", "horizon_s": 0.8, "model": "static"},
-    "static literal": {"prediction": "literal", "horizon_s": 0.05, "model": "static"},
+    "multi_step": {"prediction": {"kind": "multi_step"}},
+    "one_step": {"prediction": {"kind": "one_step", "horizon_s": 0.4}},
+    "literal": {"prediction": "literal"},
+    "static": {"prediction": {"kind": "multi_step"}, "model": "static"},
+    "static literal": {"prediction": "literal", "model": "static"},
 }
 
 
@@ -30,7 +30,11 @@ def settings_of(kind, **changes):
 
 
 def ioc(prediction="multi_step", **changes) -> IocSettings:
-    return IocSettings(kind="ioc", **{**PREDICTIONS[prediction], **changes})
+    """Settings of a way to predict; the offset is changed where it belongs."""
+    chosen = dict(PREDICTIONS[prediction])
+    if "offset" in changes:
+        chosen["prediction"] = {**chosen["prediction"], "offset": changes.pop("offset")}
+    return IocSettings(kind="ioc", **{**chosen, **changes})
 
 
 def pose_settings(**changes) -> IocSettings:
