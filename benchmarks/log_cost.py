@@ -22,8 +22,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from support import records
 from tcrctl.experiment.spec import LogSettings
+from tcrctl.log.mcap_file import Opening
 from tcrctl.log.viewer_topics import ViewerTopics
-from tcrctl.log.writer import LogWriter
+from tcrctl.log.writer import Flushing, LogWriter
 from tcrctl.signals import StepRecord
 
 N_MODULES, N_CABLES, N_RECORDS = 13, 6, 400
@@ -42,13 +43,15 @@ def log_run(rate_hz: float, seconds: float, truth: bool, paced: bool) -> tuple[l
         path = Path(folder) / "log.mcap"
         with LogWriter(
             path,
-            attachments=records.ATTACHMENTS,
-            start=records.START,
-            geometry=records.geometry(N_MODULES, N_CABLES),
-            epoch_ns=time.time_ns(),
-            period_s=period,
-            flush_steps=500 if paced else max(1, int(0.5 * rate_hz)),
-            full_state_s=LogSettings().full_state(period),
+            Opening(
+                attachments=records.ATTACHMENTS,
+                start=records.START,
+                geometry=records.geometry(N_MODULES, N_CABLES),
+                epoch_ns=time.time_ns(),
+                period_s=period,
+                full_state_s=LogSettings().full_state(period),
+            ),
+            Flushing(flush_steps=500 if paced else max(1, int(0.5 * rate_hz))),
             wait_when_full=not paced,
         ) as log:
             empty = path.stat().st_size

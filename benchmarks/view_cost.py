@@ -23,6 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from support import records
 from support.viewer_client import ViewerClient
+from tcrctl.log.mcap_file import Opening
 from tcrctl.log.viewer_topics import TOPICS
 from tcrctl.log.writer import LogWriter
 from tcrctl.view.live import LiveView
@@ -38,11 +39,13 @@ def paced_run(rate_hz: float, seconds: float, view: LiveView | None) -> tuple[li
     with tempfile.TemporaryDirectory() as folder:
         log = LogWriter(
             Path(folder) / "log.mcap",
-            attachments=records.ATTACHMENTS,
-            start=records.START,
-            geometry=records.geometry(N_MODULES, N_CABLES),
-            epoch_ns=time.time_ns(),
-            period_s=period,
+            Opening(
+                attachments=records.ATTACHMENTS,
+                start=records.START,
+                geometry=records.geometry(N_MODULES, N_CABLES),
+                epoch_ns=time.time_ns(),
+                period_s=period,
+            ),
             tap=None if view is None else view.tap,
         )
         with log:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from tcrctl.cli.log_file import LogFile
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import AsJson, unfolded
 
 
 def _print_columns(wanted: bool) -> None:
@@ -29,14 +30,22 @@ def _print_columns(wanted: bool) -> None:
     raise typer.Exit()
 
 
-def export(
-    log: LogFile,
-    as_csv: Annotated[bool, typer.Option("--csv", help="One row per step, one column per number.")] = False,
-    as_npz: Annotated[bool, typer.Option("--npz", help="One numpy array per quantity.")] = False,
+@dataclass(frozen=True)
+class Form:
+    """What is written."""
+
+    as_csv: Annotated[bool, typer.Option("--csv", help="One row per step, one column per number.")] = False
+    as_npz: Annotated[bool, typer.Option("--npz", help="One numpy array per quantity.")] = False
     as_parquet: Annotated[
         bool,
         typer.Option("--parquet", help="As CSV, in Apache Parquet; needs pip install 'tcrctl\\[parquet]'."),
-    ] = False,
+    ] = False
+
+
+@unfolded
+def export(
+    log: LogFile,
+    form: Form = Form(),
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", metavar="FILE", help="File to write; default: LOG with the new suffix."),
@@ -61,13 +70,13 @@ def export(
     from tcrctl.analysis.export import export_csv, export_npz, export_parquet
     from tcrctl.errors import InputError
 
-    if as_csv + as_npz + as_parquet != 1:
+    if form.as_csv + form.as_npz + form.as_parquet != 1:
         raise InputError("give one format: --csv, --npz or --parquet")
-    target = out or log.with_suffix(".csv" if as_csv else ".npz" if as_npz else ".parquet")
-    if as_npz:
+    target = out or log.with_suffix(".csv" if form.as_csv else ".npz" if form.as_npz else ".parquet")
+    if form.as_npz:
         names = export_npz(log, target, force=force)
     else:
-        write = export_csv if as_csv else export_parquet
+        write = export_csv if form.as_csv else export_parquet
         names = write(log, target, nodes=nodes, force=force)
     if as_json:
         print(json.dumps({"status": "ok", "file": str(target), "columns": names}))

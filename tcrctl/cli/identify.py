@@ -6,12 +6,13 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson, Overrides
+from tcrctl.cli.options import AsJson, Overrides, unfolded
 
 if TYPE_CHECKING:
     from tcrctl.identify.loading import LoadedIdentification
@@ -56,14 +57,29 @@ Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the folde
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
+@dataclass(frozen=True)
+class Told:
+    """An identification that is told on the command line, without a file."""
+
+    data: From = None
+    robot: RobotName = None
+    params: Params = None
+
+
+@dataclass(frozen=True)
+class Changed:
+    """Shorts for ``--set``."""
+
+    method: MethodName = None
+    strung_by: StrungBy = None
+    seed: Seed = None
+
+
+@unfolded
 def identify(
     inputs: Inputs = None,
-    data: From = None,
-    robot: RobotName = None,
-    params: Params = None,
-    method: MethodName = None,
-    strung_by: StrungBy = None,
-    seed: Seed = None,
+    told: Told = Told(),
+    changed: Changed = Changed(),
     jobs: Jobs = None,
     overrides: Overrides = None,
     out: Out = Path("logs"),
@@ -85,12 +101,12 @@ def identify(
     from tcrctl.loop.interruption import signals_exit
 
     say = (lambda text: None) if quiet else _say
-    changes = [*(overrides or ()), *_assignments(method, strung_by, seed)]
+    changes = [*(overrides or ()), *_assignments(changed)]
     with signals_exit():
         from tcrctl.experiment.run_folder import check_writable
 
         check_writable(out)
-        loaded = _loaded(inputs or [], data, robot, params, changes)
+        loaded = _loaded(inputs or [], told, changes)
         say(_headline(loaded))
         from tcrctl.identify.identification import identify as find
     with _progress_line(shown=not quiet) as progress:
@@ -111,18 +127,16 @@ def identify(
         raise typer.Exit(result.exit_code)
 
 
-def _assignments(method: str | None, strung_by: str | None, seed: int | None) -> list[str]:
-    given = {"method": method, "strung_by": strung_by, "seed": seed}
-    return [f"{key}={value}" for key, value in given.items() if value is not None]
+def _assignments(changed: Changed) -> list[str]:
+    return [f"{key}={value}" for key, value in vars(changed).items() if value is not None]
 
 
-def _loaded(
-    inputs: list[str], data: list[str] | None, robot: str | None, params: str | None, changes: list[str]
-) -> LoadedIdentification:
+def _loaded(inputs: list[str], told: Told, changes: list[str]) -> LoadedIdentification:
     from tcrctl.errors import InputError
     from tcrctl.identify.loading import load_identification
 
-    if not data:
+    robot, params = told.robot, told.params
+    if not told.data:
         if robot or params:
             raise InputError("--robot and --params belong to --from; a SPEC says both itself")
         if len(inputs) != 1:
@@ -132,7 +146,7 @@ def _loaded(
         return load_identification(inputs[0], changes)
     if not robot or not params:
         raise InputError("--from needs --robot and --params", hint="See: tcrctl identify --help")
-    return _from_data([*data, *inputs], robot, params, changes)
+    return _from_data([*told.data, *inputs], robot, params, changes)
 
 
 def _from_data(data: list[str], robot: str, params: str, changes: list[str]) -> LoadedIdentification:

@@ -3,32 +3,41 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tcrctl.cli.log_file import LogFile
+from tcrctl.cli.options import unfolded
 
 if TYPE_CHECKING:
     from tcrctl.view.server import ViewServer
 
 
-def play(
-    log: LogFile,
-    rate: Annotated[
-        float, typer.Option("--rate", "-r", metavar="X", help="Speed; 2 is twice as fast.")
-    ] = 1.0,
-    loop: Annotated[bool, typer.Option("--loop", "-l", help="Begin again at the end.")] = False,
-    begin: Annotated[
-        float | None, typer.Option("--from", metavar="SECONDS", help="First time played.")
-    ] = None,
-    end: Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="Last time played.")] = None,
-    paused: Annotated[bool, typer.Option("--paused", help="Wait for the app to start it.")] = False,
-    once: Annotated[bool, typer.Option("--once", help="End after the last message.")] = False,
+Begin = Annotated[float | None, typer.Option("--from", metavar="SECONDS", help="First time played.")]
+
+
+@dataclass(frozen=True)
+class Playing:
+    """What is played, and how."""
+
+    rate: Annotated[float, typer.Option("--rate", "-r", metavar="X", help="Speed; 2 is twice as fast.")] = 1.0
+    loop: Annotated[bool, typer.Option("--loop", "-l", help="Begin again at the end.")] = False
+    begin: Begin = None
+    end: Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="Last time played.")] = None
+    paused: Annotated[bool, typer.Option("--paused", help="Wait for the app to start it.")] = False
+    once: Annotated[bool, typer.Option("--once", help="End after the last message.")] = False
     topics: Annotated[
         list[str] | None,
         typer.Option("--topic", metavar="NAME", help="Which topics; repeatable. Default: all."),
-    ] = None,
+    ] = None
+
+
+@unfolded
+def play(
+    log: LogFile,
+    playing: Playing = Playing(),
     host: Annotated[
         str, typer.Option("--host", metavar="ADDRESS", help="Where to serve; 0.0.0.0 for everybody.")
     ] = "127.0.0.1",
@@ -50,7 +59,15 @@ def play(
     from tcrctl.view.play import Playback
     from tcrctl.view.play import play as play_log
 
-    playback = Playback(rate, begin, end, loop, paused, once, topics or ())
+    playback = Playback(
+        rate=playing.rate,
+        begin=playing.begin,
+        end=playing.end,
+        loop=playing.loop,
+        paused=playing.paused,
+        once=playing.once,
+        topics=playing.topics or (),
+    )
     with Interruption() as interruption:
         try:
             play_log(log, playback, host=host, port=port, ready=_say_where, check=interruption.check)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tcrctl.cli.log_file import LogFile
-from tcrctl.cli.options import AsJson, Overrides
+from tcrctl.cli.options import AsJson, Overrides, unfolded
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -38,13 +39,21 @@ Plot = Annotated[
 ]
 
 
+@dataclass(frozen=True)
+class Compared:
+    """Which steps are compared, and how strictly."""
+
+    first: First = None
+    last: Last = None
+    atol: Atol = 0.0
+    rtol: Rtol = 0.0
+
+
+@unfolded
 def replay(
     log: LogFile,
     overrides: Overrides = None,
-    first: First = None,
-    last: Last = None,
-    atol: Atol = 0.0,
-    rtol: Rtol = 0.0,
+    compared: Compared = Compared(),
     out: Out = None,
     plot: Plot = None,
     as_json: AsJson = False,
@@ -71,7 +80,7 @@ def replay(
     from tcrctl.replay.replay import replay as run_replay
     from tcrctl.replay.result import Tolerance, checked_window
 
-    window, drawing = checked_window(first, last), None
+    window, drawing = checked_window(compared.first, compared.last), None
     if plot is not None:
         check_format(plot)
         drawing = WhatIf()
@@ -80,7 +89,7 @@ def replay(
             log,
             overrides=overrides or (),
             window=window,
-            tolerance=Tolerance(atol, rtol),
+            tolerance=Tolerance(compared.atol, compared.rtol),
             out=out,
             watch=None if drawing is None else drawing.add,
             announce=_announce,

@@ -6,12 +6,13 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson, Overrides, Spec
+from tcrctl.cli.options import AsJson, Overrides, Spec, unfolded
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -41,17 +42,32 @@ Yes = Annotated[bool, typer.Option("--yes", help="A rig: the drives may be armed
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
+@dataclass(frozen=True)
+class Manner:
+    """How an experiment is run."""
+
+    dry_run: DryRun = False
+    realtime: RealTime = False
+    out: Out = Path("logs")
+    seed: Seed = None
+    force: Force = False
+
+
+@dataclass(frozen=True)
+class Viewing:
+    """Whether and where a run is shown while it runs."""
+
+    view: View = False
+    view_host: ViewHost = "127.0.0.1"
+    view_port: ViewPort = 8765
+
+
+@unfolded
 def run(
     spec: Spec,
     overrides: Overrides = None,
-    dry_run: DryRun = False,
-    realtime: RealTime = False,
-    out: Out = Path("logs"),
-    seed: Seed = None,
-    force: Force = False,
-    view: View = False,
-    view_host: ViewHost = "127.0.0.1",
-    view_port: ViewPort = 8765,
+    manner: Manner = Manner(),
+    viewing: Viewing = Viewing(),
     yes: Yes = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -74,7 +90,8 @@ def run(
     from tcrctl.loop.interruption import signals_exit
 
     say: Notify = _nothing if quiet else _say
-    with ExitStack() as viewing:
+    dry_run, shown = manner.dry_run, viewing.view and not manner.dry_run
+    with ExitStack() as stack:
         with signals_exit():
             loaded = load_spec(spec, overrides or ())
             for note in loaded.notes:
@@ -83,19 +100,18 @@ def run(
             if not dry_run:
                 if loaded.rig is not None and not yes:
                     check_can_ask()
-                _get_ready(out)
-            served = _live_view(loaded, view_host, view_port, say) if view and not dry_run else nullcontext()
-            tap = viewing.enter_context(served)
+                _get_ready(manner.out)
+            tap = stack.enter_context(_live_view(loaded, viewing, say) if shown else nullcontext())
             from tcrctl.experiment.prepare import prepare
 
-            experiment = prepare(loaded, seed=seed, notify=say)
-            path = _planned(experiment, force, say)
+            experiment = prepare(loaded, seed=manner.seed, notify=say)
+            path = _planned(experiment, manner.force, say)
         if dry_run:
             print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
             return
         if loaded.rig is not None and not yes:
             ask(f"{loaded.robot.name} on rig {loaded.rig.rig.name} will move for {_length(experiment)}.")
-        summary = _run(experiment, out, realtime, say, tap, quiet=quiet)
+        summary = _run(experiment, manner, say, tap, quiet=quiet)
     if summary.reason:
         print(f"{'error' if summary.exit_code != 3 else summary.status}: {summary.reason}", file=sys.stderr)
     if as_json:
@@ -115,25 +131,29 @@ def _get_ready(out: Path) -> None:
 
 
 @contextmanager
-def _live_view(loaded: LoadedSpec, host: str, port: int, say: Notify) -> Iterator[Tap]:
+def _live_view(loaded: LoadedSpec, viewing: Viewing, say: Notify) -> Iterator[Tap]:
     """Serve the run to the Foxglove app while it is prepared and while it runs."""
     from tcrctl.view.live import LiveView
 
-    with LiveView(loaded.spec.name, host=host, port=port) as live:
+    with LiveView(loaded.spec.name, host=viewing.view_host, port=viewing.view_port) as live:
         say(f"live view at {live.url}; open {live.app_url}")
         yield live.tap
         if live.failure is not None:
             say(f"warning: the live view ended before the run: {live.failure}")
 
 
-def _run(
-    experiment: Experiment, out: Path, realtime: bool, say: Notify, tap: Tap | None, *, quiet: bool
-) -> Summary:
+def _run(experiment: Experiment, manner: Manner, say: Notify, tap: Tap | None, *, quiet: bool) -> Summary:
     from tcrctl.experiment.run import run_experiment
 
     with progress_bar(experiment.spec.name, shown=not quiet) as progress:
         return run_experiment(
-            experiment, out=out, realtime=realtime, confirmed=True, notify=say, progress=progress, tap=tap
+            experiment,
+            out=manner.out,
+            realtime=manner.realtime,
+            confirmed=True,
+            notify=say,
+            progress=progress,
+            tap=tap,
         )
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson, Overrides, Spec
+from tcrctl.cli.options import AsJson, Overrides, Spec, unfolded
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -35,11 +36,19 @@ TABLES = (".csv", ".npz")
 FIGURES = (".png", ".pdf", ".svg")
 
 
+@dataclass(frozen=True)
+class Where:
+    """At which steps a loop is linearised."""
+
+    points: Points = 24
+    every: Every = None
+
+
+@unfolded
 def stability(
     spec: Spec,
     overrides: Overrides = None,
-    points: Points = 24,
-    every: Every = None,
+    where: Where = Where(),
     out: Out = None,
     figure: Figure = None,
     force: Force = False,
@@ -70,7 +79,7 @@ def stability(
 
         experiment = prepare(loaded, notify=_nothing if quiet else _say)
     with progress_bar(loaded.spec.name, shown=not quiet) as progress:
-        report = analyse(experiment, points=points, every=every, progress=progress)
+        report = analyse(experiment, points=where.points, every=where.every, progress=progress)
     if out is not None:
         _write(report, out)
     if figure is not None:

@@ -30,8 +30,8 @@ from tcrctl.experiment.run_folder import (
 from tcrctl.experiment.summary import Summary, Verdict, judge
 from tcrctl.log.file_names import RESOLVED, SPEC
 from tcrctl.log.geometry import CableRoute, LogGeometry
-from tcrctl.log.mcap_file import Tap
-from tcrctl.log.writer import LogWriter
+from tcrctl.log.mcap_file import Opening, Tap
+from tcrctl.log.writer import Flushing, LogWriter
 from tcrctl.loop.interruption import Interruption
 from tcrctl.loop.loop import Parts, run_loop
 from tcrctl.loop.pacing import Pace, RealTime, Unpaced
@@ -116,15 +116,15 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap:
         folder.write(RESOLVED, resolved_text(spec))
         return LogWriter(
             folder.path / LOG,
-            attachments=attachments(loaded, spec),
-            start=start_metadata(folder.run_id, loaded, spec, realtime=realtime),
-            geometry=log_geometry(experiment.robot, experiment.trajectory),
-            epoch_ns=time.time_ns(),
-            period_s=experiment.period,
-            flush_s=spec.log.flush_s,
-            flush_steps=spec.log.flush_steps,
-            full_state_s=spec.full_state_s,
-            fsync=spec.log.fsync,
+            Opening(
+                attachments=attachments(loaded, spec),
+                start=start_metadata(folder.run_id, loaded, spec, realtime=realtime),
+                geometry=log_geometry(experiment.robot, experiment.trajectory),
+                epoch_ns=time.time_ns(),
+                period_s=experiment.period,
+                full_state_s=spec.full_state_s,
+            ),
+            Flushing(spec.log.flush_s, spec.log.flush_steps, spec.log.fsync),
             wait_when_full=not realtime,
             tap=tap,
         )

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Final
 
@@ -58,34 +59,47 @@ def _end_of_file(stop: Mapping[str, str]) -> bytes:
     return bytes(builder.end()) + MCAP0_MAGIC
 
 
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """What a log is told before the first step.
+
+    Attributes:
+        attachments: Media type and content by file name, in the order in which they are written.
+        start: Metadata ``tcrctl.run.start``; schema version, epoch and period are added.
+        geometry: Names and topology of the robot.
+        epoch_ns: Unix time of t = 0 [ns].
+        period_s: Control period [s].
+        full_state_s: Time between two steps that are written in full [s]; 0: every step. See
+            :mod:`tcrctl.log.schema`.
+    """
+
+    attachments: Attachments
+    start: Mapping[str, str]
+    geometry: LogGeometry
+    epoch_ns: int
+    period_s: float
+    full_state_s: float = 0.0
+
+
 class McapFile:
     """Writes header, attachments and start metadata when made; then steps and events; last the stop."""
 
-    def __init__(
-        self,
-        stream: IO[bytes],
-        *,
-        attachments: Attachments,
-        start: Mapping[str, str],
-        geometry: LogGeometry,
-        epoch_ns: int,
-        period_s: float,
-        full_state_s: float = 0.0,
-    ) -> None:
-        """Write everything that is known before the first step; see :class:`tcrctl.log.writer.LogWriter`."""
+    def __init__(self, stream: IO[bytes], opening: Opening) -> None:
+        """Write everything that is known before the first step."""
+        epoch_ns, period_s = opening.epoch_ns, opening.period_s
         self._stream, self._epoch_ns = stream, epoch_ns
-        self._viewer = ViewerTopics(geometry, period_s)
-        self._encoder = StepEncoder(max(1, round(full_state_s / period_s)))
+        self._viewer = ViewerTopics(opening.geometry, period_s)
+        self._encoder = StepEncoder(max(1, round(opening.full_state_s / period_s)))
         # Chunks end in flush() only, which lets the encoder begin anew.
         self._writer: Any = new_mcap(stream, chunk_size=2**62)
         self._chunk = 0
         self._whole: list[int] = []  # where the file ended after each of the last two flushes
-        for name, (media_type, data) in attachments.items():
+        for name, (media_type, data) in opening.attachments.items():
             self._writer.add_attachment(epoch_ns, epoch_ns, name, media_type, data)
         own = {"log_schema": VERSION, "epoch_ns": str(epoch_ns), "period_s": repr(period_s)}
-        self._writer.add_metadata(START, {**start, **own})
+        self._writer.add_metadata(START, {**opening.start, **own})
         self._schemas: dict[str, int] = {}
-        self._channels = self._register(geometry)
+        self._channels = self._register(opening.geometry)
         self._events = 0
         self.tap: Tap | None = None
         self.steps = 0

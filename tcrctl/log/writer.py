@@ -17,6 +17,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -24,8 +25,7 @@ from typing import BinaryIO, Final, Self
 
 from tcrctl.errors import LogError
 from tcrctl.log.event import Event
-from tcrctl.log.geometry import LogGeometry
-from tcrctl.log.mcap_file import Attachments, McapFile, Tap
+from tcrctl.log.mcap_file import McapFile, Opening, Tap
 from tcrctl.signals import StepRecord
 
 _QUEUE_S: Final = 2.0  # a writer that lags further behind will not catch up: the disk is too slow
@@ -37,6 +37,22 @@ _POLL_S: Final = 1.0  # how often an idle writer looks whether the main thread s
 def open_new(path: Path) -> BinaryIO:
     """Open a file for writing that must not exist yet."""
     return open(path, "xb")
+
+
+@dataclass(frozen=True, slots=True)
+class Flushing:
+    """How often what is logged reaches the disk: at the earlier of the two intervals.
+
+    Attributes:
+        flush_s: A step is flushed at most this long after it was logged [s]; in a run that no clock paces, this
+            much of the run's own time counts if it takes longer.
+        flush_steps: At most this many steps are unflushed.
+        fsync: Also wait at every flush until the disk has it (survives a power cut).
+    """
+
+    flush_s: float = 0.5
+    flush_steps: int = 500
+    fsync: bool = False
 
 
 class LogWriter:
@@ -51,16 +67,9 @@ class LogWriter:
     def __init__(
         self,
         path: str | os.PathLike[str],
+        opening: Opening,
+        flushing: Flushing = Flushing(),
         *,
-        attachments: Attachments,
-        start: Mapping[str, str],
-        geometry: LogGeometry,
-        epoch_ns: int,
-        period_s: float,
-        flush_s: float = 0.5,
-        flush_steps: int = 500,
-        fsync: bool = False,
-        full_state_s: float = 0.0,
         wait_when_full: bool = False,
         tap: Tap | None = None,
         opener: Callable[[Path], BinaryIO] = open_new,
@@ -69,17 +78,8 @@ class LogWriter:
 
         Args:
             path: File to create; it must not exist.
-            attachments: Media type and content by file name, in the order in which they are written.
-            start: Metadata ``tcrctl.run.start``; schema version, epoch and period are added.
-            geometry: Names and topology of the robot.
-            epoch_ns: Unix time of t = 0 [ns].
-            period_s: Control period [s].
-            flush_s: A step is flushed at most this long after it was logged [s]; in a run that no clock paces, this
-                much of the run's own time counts if it takes longer.
-            flush_steps: At most this many steps are unflushed.
-            fsync: Also wait at every flush until the disk has it (survives a power cut).
-            full_state_s: Time between two steps that are written in full [s]; 0: every step. See
-                :mod:`tcrctl.log.schema`.
+            opening: What is written before the first step.
+            flushing: How often what is written reaches the disk.
             wait_when_full: Let :meth:`step` wait for the writer thread from time to time, instead of failing when
                 it lags; for runs that no clock paces.
             tap: Takes every message when it has been written, in the writer thread; it must neither wait nor raise.
@@ -89,12 +89,12 @@ class LogWriter:
             LogError: If the file cannot be created; nothing is left behind.
         """
         self.path = Path(path)
-        self._flush_s, self._flush_steps, self._fsync = flush_s, flush_steps, fsync
+        self._flushing, period_s = flushing, opening.period_s
         self._wait_when_full = wait_when_full
         self._least, self._turn_steps = 1, 0
         if wait_when_full:  # on a slow machine too a chunk shall be worth compressing
-            self._least = max(1, math.ceil(flush_s / period_s - 1e-9))
-            self._turn_steps = max(1, min(_TURN_STEPS, flush_steps // 2))
+            self._least = max(1, math.ceil(flushing.flush_s / period_s - 1e-9))
+            self._turn_steps = max(1, min(_TURN_STEPS, flushing.flush_steps // 2))
         self._limit = max(_QUEUE_MIN_STEPS, math.ceil(_QUEUE_S / period_s))
         self._queue: SimpleQueue[StepRecord | Event | dict[str, str]] = SimpleQueue()
         self._turn, self._written = threading.Event(), threading.Event()
@@ -103,15 +103,7 @@ class LogWriter:
         self._finished = self._reported = False
         self._stream = _create(self.path, opener)
         try:
-            self._file = McapFile(
-                self._stream,
-                attachments=attachments,
-                start=start,
-                geometry=geometry,
-                epoch_ns=epoch_ns,
-                period_s=period_s,
-                full_state_s=full_state_s,
-            )
+            self._file = McapFile(self._stream, opening)
         except Exception as error:
             with suppress(OSError):
                 self._stream.close()
@@ -229,7 +221,7 @@ class LogWriter:
             item = self._next(flush_at)
             if isinstance(item, dict):
                 self._file.finish(item)
-                if self._fsync:
+                if self._flushing.fsync:
                     os.fsync(self._stream.fileno())
                 return
             if isinstance(item, StepRecord):
@@ -244,7 +236,7 @@ class LogWriter:
             return self._queue.get_nowait()
         self._written.set()
         if self._wait_when_full:  # what is logged outside a turn waits half a flush interval at most
-            self._turn.wait(min(_POLL_S, 0.5 * self._flush_s))
+            self._turn.wait(min(_POLL_S, 0.5 * self._flushing.flush_s))
             self._turn.clear()
         else:
             wait = max(0.0, min(_POLL_S, flush_at - time.monotonic()))
@@ -259,11 +251,11 @@ class LogWriter:
         if self._file.unflushed == 0:
             return math.inf
         now, waiting = time.monotonic(), self._file.unflushed
-        room = max(1, self._flush_steps - self._turn_steps)  # so many may wait for the next turn
+        room = max(1, self._flushing.flush_steps - self._turn_steps)  # so many may wait for the next turn
         if waiting >= room or (now >= flush_at and waiting >= self._least):
-            self._file.flush(to_disk=self._fsync)
+            self._file.flush(to_disk=self._flushing.fsync)
             return math.inf
-        return min(flush_at, now + (0.5 if self._wait_when_full else 1.0) * self._flush_s)
+        return min(flush_at, now + (0.5 if self._wait_when_full else 1.0) * self._flushing.flush_s)
 
 
 def _create(path: Path, opener: Callable[[Path], BinaryIO]) -> BinaryIO:

@@ -8,8 +8,9 @@ from pathlib import Path
 from tcrctl.experiment.provenance import resolved_text, versions
 from tcrctl.experiment.run import log_geometry
 from tcrctl.log.file_names import RESOLVED, VERSIONS
+from tcrctl.log.mcap_file import Opening
 from tcrctl.log.reader import Log
-from tcrctl.log.writer import LogWriter
+from tcrctl.log.writer import Flushing, LogWriter
 from tcrctl.replay.rebuild import Origin
 from tcrctl.robot.robot import Robot
 
@@ -39,15 +40,12 @@ def open_replayed(out: Path, log: Log, origin: Origin, robot: Robot) -> LogWrite
         RESOLVED: ("application/yaml", resolved_text(spec)),
         VERSIONS: ("application/json", json.dumps(versions(), indent=2).encode()),
     }
-    return LogWriter(
-        out,
+    opening = Opening(
         attachments={**log.attachments, **own},
         start=start,
         geometry=log_geometry(robot),
         epoch_ns=int(log.start.get("epoch_ns", "0")),
         period_s=spec.controller.period_s,
-        flush_s=spec.log.flush_s,
-        flush_steps=spec.log.flush_steps,
         full_state_s=spec.full_state_s,
-        wait_when_full=True,
     )
+    return LogWriter(out, opening, Flushing(spec.log.flush_s, spec.log.flush_steps), wait_when_full=True)

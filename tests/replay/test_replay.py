@@ -20,6 +20,7 @@ from tcrctl.experiment.run import log_geometry, run_experiment
 from tcrctl.experiment.spec import load_spec
 from tcrctl.log.comparison import Comparison, Difference, quantities
 from tcrctl.log.file_names import RESOLVED
+from tcrctl.log.mcap_file import Opening
 from tcrctl.log.reader import read_log
 from tcrctl.log.recover import recover
 from tcrctl.log.writer import LogWriter
@@ -64,11 +65,13 @@ def rewritten(path, out, change=lambda step: step, attachments=None):
     log = read_log(path)
     writer = LogWriter(
         out,
-        attachments={**log.attachments, **(attachments or {})},
-        start=log.start,
-        geometry=geometry(),
-        epoch_ns=int(log.start["epoch_ns"]),
-        period_s=0.05,
+        Opening(
+            attachments={**log.attachments, **(attachments or {})},
+            start=log.start,
+            geometry=geometry(),
+            epoch_ns=int(log.start["epoch_ns"]),
+            period_s=0.05,
+        ),
         wait_when_full=True,
     )
     with writer:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import subprocess
 import sys
 import time
 
 from support import records
+from tcrctl.log.mcap_file import Opening
 from tcrctl.log.reader import read_log
-from tcrctl.log.writer import LogWriter
+from tcrctl.log.writer import Flushing, LogWriter
 
 STOP = {"status": "success", "summary": json.dumps({"criteria": []})}
 
@@ -17,6 +19,7 @@ N_STEPS = 60
 
 
 def open_log(path, **options):
+    """A log of the records here; options are fields of the opening or the flushing, or the writer's own."""
     defaults = {
         "attachments": records.ATTACHMENTS,
         "start": records.START,
@@ -24,7 +27,15 @@ def open_log(path, **options):
         "epoch_ns": records.EPOCH_NS,
         "period_s": records.PERIOD_S,
     }
-    return LogWriter(path, **(defaults | options))
+    of_opening = {field.name for field in dataclasses.fields(Opening)}
+    of_flushing = {field.name for field in dataclasses.fields(Flushing)}
+    given = defaults | options
+    return LogWriter(
+        path,
+        Opening(**{name: value for name, value in given.items() if name in of_opening}),
+        Flushing(**{name: value for name, value in given.items() if name in of_flushing}),
+        **{name: value for name, value in given.items() if name not in of_opening | of_flushing},
+    )
 
 
 def write_steps(path, **options):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import AsJson, unfolded
 from tcrctl.cli.rig.action import act
 from tcrctl.cli.rig.options import DryRun, Rig, Robot, Yes
 
@@ -15,14 +16,22 @@ if TYPE_CHECKING:
     from tcrctl.plant.rig.session import Session
 
 
-def jog(
-    rig: Rig,
+@dataclass(frozen=True)
+class Wanted:
+    """Which cables move, how far and how fast."""
+
     cable: Annotated[
         list[str], typer.Option("--cable", metavar="NAME", help="Cable to move, or all; repeatable.")
-    ],
-    by_mm: Annotated[float | None, typer.Option("--by-mm", help="How far; positive pulls.")] = None,
-    to_mm: Annotated[float | None, typer.Option("--to-mm", help="Where to, from tension-zero.")] = None,
-    speed_mm_s: Annotated[float, typer.Option("--speed-mm-s", min=0.01, max=20, help="Largest speed.")] = 5.0,
+    ]
+    by_mm: Annotated[float | None, typer.Option("--by-mm", help="How far; positive pulls.")] = None
+    to_mm: Annotated[float | None, typer.Option("--to-mm", help="Where to, from tension-zero.")] = None
+    speed_mm_s: Annotated[float, typer.Option("--speed-mm-s", min=0.01, max=20, help="Largest speed.")] = 5.0
+
+
+@unfolded
+def jog(
+    rig: Rig,
+    wanted: Wanted,
     robot: Robot = None,
     dry_run: DryRun = False,
     yes: Yes = False,
@@ -39,18 +48,19 @@ def jog(
     from tcrctl.errors import InputError
     from tcrctl.loop.interruption import Interruption
 
+    cable, by_mm, to_mm = wanted.cable, wanted.by_mm, wanted.to_mm
     if (by_mm is None) == (to_mm is None):
         raise InputError("give either --by-mm or --to-mm")
 
     def move(loaded: LoadedRig, names: tuple[str, ...], session: Session) -> dict[str, Any]:
-        wanted = Jog(
+        motion = Jog(
             names if cable == ["all"] else tuple(cable),
             None if by_mm is None else 1e-3 * by_mm,
             None if to_mm is None else 1e-3 * to_mm,
-            1e-3 * speed_mm_s,
+            1e-3 * wanted.speed_mm_s,
         )
         with Interruption() as interruption:
-            return jog_rig(loaded, names, wanted, session, dry_run=dry_run, check=interruption.check)
+            return jog_rig(loaded, names, motion, session, dry_run=dry_run, check=interruption.check)
 
     where = f"by {by_mm:g} mm" if by_mm is not None else f"to {to_mm:g} mm"
     act(
