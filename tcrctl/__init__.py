@@ -20,7 +20,7 @@ name              meaning                                                     sh
 ``theta_x, _y``   end orientation angles of eq. (45), both 0 at rest          ()                rad
 ``period``        control period η                                            ()                s
 ``horizon``       prediction horizon of the controller                        ()                s
-``step``          internal time step of an integrator                         ()                s
+``step``, h       internal time step of an integrator                         ()                s
 ``k``             index of the control step, 0 .. n-1
 ================  ==========================================================  ================  =======
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -21,14 +22,18 @@ from support.closed_loop import (
     settings_of,
 )
 from tcrctl.controller.blocks import block_edges, superpose
-from tcrctl.controller.controller import build_controller
+from tcrctl.controller.controller import KINDS as CONTROLLERS
+from tcrctl.controller.controller import PLANNERS, build_controller
 from tcrctl.controller.cost import outputs
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.multi_step import MultiStep
 from tcrctl.controller.settings import (
+    ControllerSettings,
     CostWeights,
     IntegralSettings,
+    IocSettings,
     OffsetSettings,
+    Prediction,
 )
 from tcrctl.plant.settings import Mismatch
 from tcrctl.robot import dynamics, pose
@@ -83,6 +88,40 @@ def test_a_state_that_is_not_finite_holds_the_drives(tcr600, kind):
     command, info = controller.control(estimate, constant(tcr600, controller))
     assert not info.converged
     assert np.array_equal(command.speed, np.zeros(3))
+
+
+def members(union):
+    """Settings classes of a union that is told apart by ``kind``, by kind."""
+    return {
+        get_args(member.model_fields["kind"].annotation)[0]: member for member in get_args(get_args(union)[0])
+    }
+
+
+def test_the_tables_have_every_kind_that_a_file_may_name():
+    assert {kind: settings for kind, (settings, _) in CONTROLLERS.items()} == members(ControllerSettings)
+    assert set(PLANNERS) == set(members(Prediction))
+
+
+@pytest.mark.parametrize("kind", ["multi_step", "one_step", "literal"])
+def test_the_bare_name_of_a_prediction_stands_for_its_defaults(kind):
+    bare = IocSettings(kind="ioc", prediction=kind)
+    assert bare == IocSettings(kind="ioc", prediction={"kind": kind})
+    assert IocSettings.model_validate_json(bare.model_dump_json()) == bare
+
+
+def test_a_prediction_without_a_kind_is_the_multi_step_one():
+    assert IocSettings(kind="ioc", prediction={"horizon_s": 0.6}).prediction.kind == "multi_step"
+
+
+def test_the_last_input_is_what_was_sent(tcr600):
+    """A step in doubt holds the drives, so the next one begins from standstill."""
+    controller = build_controller(ioc(), tcr600)
+    reference = constant(tcr600, controller, (0.01, 0.0, 0.02))
+    command, _ = controller.control(resting(tcr600), reference)
+    assert np.array_equal(controller.memory()["speed"].values, command.speed)
+    controller.control(replace(resting(tcr600), converged=False), reference)
+    assert not controller.memory()["speed"].values.any()
+    assert not controller.memory()["needed"].values.any()
 
 
 def test_same_inputs_give_the_same_bytes(tcr700):

@@ -55,7 +55,7 @@ def cost(case, U: np.ndarray) -> float:
 
 def solved(case) -> Solution:
     problem = build_ioc(*case)
-    return Solution(*solve_ioc(problem, case[0], case[5]))
+    return solve_ioc(problem, case[0], case[5])
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -14,6 +14,8 @@ from mcap.reader import make_reader
 from support.log_files import doctor
 from support.short_runs import short_spec
 from tcrctl.cli.app import main
+from tcrctl.config import strict_yaml
+from tcrctl.controller.settings import MultiStepSettings
 from tcrctl.errors import InputError, LogError
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import log_geometry, run_experiment
@@ -98,6 +100,18 @@ def test_every_kind_of_run_replays_bit_for_bit(logs, name):
     assert (found.status, found.reason) == ("identical", "")
     assert (found.steps, found.compared, found.different, found.exit_code) == (steps, steps, 0, 0)
     assert (found.environment, found.not_compared) == ((), ())
+
+
+@pytest.mark.parametrize("name", ["full", "literal", "one_step"])
+def test_a_log_with_the_settings_of_an_older_version_replays_bit_for_bit(logs, tmp_path, name):
+    """All keys of a prediction stood beside it then, with or without a meaning for its kind."""
+    settings = strict_yaml.loads(read_log(logs(name)).attachments[RESOLVED][1]).data
+    controller, prediction = settings["controller"], settings["controller"]["prediction"]
+    beside = MultiStepSettings(kind="multi_step").model_dump(mode="json") | prediction
+    settings["controller"] = {**controller, **beside, "kind": "ioc", "prediction": prediction["kind"]}
+    text = strict_yaml.dumps(settings).encode()
+    path = rewritten(logs(name), tmp_path / "old.mcap", attachments={RESOLVED: ("application/yaml", text)})
+    assert replay(path).status == "identical"
 
 
 def test_the_variants_are_what_they_claim(logs):
