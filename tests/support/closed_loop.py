@@ -30,10 +30,11 @@ def settings_of(kind, **changes):
 
 
 def ioc(prediction="multi_step", **changes) -> IocSettings:
-    """Settings of a way to predict; the offset is changed where it belongs."""
+    """Settings of a way to predict; keys of a multi-step prediction are changed where they belong."""
     chosen = dict(PREDICTIONS[prediction])
-    if "offset" in changes:
-        chosen["prediction"] = {**chosen["prediction"], "offset": changes.pop("offset")}
+    below = {key: changes.pop(key) for key in ("offset", "feedforward") if key in changes}
+    if below:
+        chosen["prediction"] = {**chosen["prediction"], **below}
     return IocSettings(kind="ioc", **{**chosen, **changes})
 
 
