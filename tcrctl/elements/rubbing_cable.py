@@ -160,7 +160,13 @@ def solve_chain(s: Stretches, cap: Array, first: int, last: int) -> None:
 
 @njit(cache=True, error_model="numpy")
 def measure(
-    q: Array, drive: Array, first_hole: np.ndarray, nodes: np.ndarray, weights: Array, cables: Array, s: Stretches
+    q: Array,
+    drive: Array,
+    first_hole: np.ndarray,
+    nodes: np.ndarray,
+    weights: Array,
+    cables: Array,
+    s: Stretches,
 ) -> None:
     """Fill lengths and directions of all stretches; arguments as in ``sliding_cable``."""
     for c in range(drive.shape[0]):

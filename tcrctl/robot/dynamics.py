@@ -83,8 +83,10 @@ def unworn(model: Model, q: Array, drive: Array, tension: Array, holes: Array) -
     along = np.repeat(tension, np.diff(first))
     ea = np.repeat(cables[:, sliding_cable.STIFFNESS] * cables[:, sliding_cable.REST], np.diff(first))
     rest = s.length / (1.0 + along / ea)
-    slack = np.repeat(cables[:, sliding_cable.REST], np.diff(first)) * s.length / np.repeat(
-        np.add.reduceat(s.length, first[:-1]), np.diff(first)
+    slack = (
+        np.repeat(cables[:, sliding_cable.REST], np.diff(first))
+        * s.length
+        / np.repeat(np.add.reduceat(s.length, first[:-1]), np.diff(first))
     )
     rest = np.where(along > 0.0, rest, slack)
     zeros = np.zeros_like(along)

@@ -219,7 +219,13 @@ def _add_cables(model: Model, q: Array, drive: Array, load: Load, ws: Workspace)
 
 @njit(cache=True, error_model="numpy")
 def _add_all_cables(
-    model: Model, q: Array, drive: Array, load: Load, slip: Slip | None, stretches: Stretches | None, ws: Workspace
+    model: Model,
+    q: Array,
+    drive: Array,
+    load: Load,
+    slip: Slip | None,
+    stretches: Stretches | None,
+    ws: Workspace,
 ) -> float:
     """Add the cables, with or without friction in their holes: which, is compiled in."""
     if slip is None:
