@@ -58,7 +58,7 @@ def newton_map(what: str, robot: Robot, load: Load, drive: Array, q: Array) -> I
     """
     first, ws = 3 * FIXED, make_workspace(robot.model)
     nodal, bars, cables = load.nodal.copy(), load.bar_before.copy(), load.cable_before.copy()
-    at = Load(load.inertia, load.w, nodal, bars, cables)
+    at = Load(load.inertia, load.w, nodal, bars, cables, None)
 
     def apply(z: Array) -> Array:
         moved, step = q.copy(), np.empty(z.shape)

@@ -63,7 +63,7 @@ class OneStep:
         s.nodal[Q_FREE] = q + v / (step * inertia)
         s.nodal[FORCE] = self._robot.weight
         dynamics.lengths_before(self._robot.model, q, v, drive, np.zeros_like(drive), 0.0, s, self._work)
-        return Load(inertia, 1.0 / step, s.nodal, s.bar_before, s.cable_before)
+        return Load(inertia, 1.0 / step, s.nodal, s.bar_before, s.cable_before, None)
 
     def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""

@@ -64,7 +64,7 @@ class PassiveObserver:
             s.nodal[SPRING, self._seen] = self._stiffness * float(np.mean(self._valid)) ** 2
         s.nodal[SPRING_AT, self._seen] = measured.nodes[self._valid].ravel()
         dynamics.lengths_before(model, self._q, self._v, self._drive, self._still, 0.0, s, self._work)
-        return Load(inertia, 1.0 / period, s.nodal, s.bar_before, s.cable_before)
+        return Load(inertia, 1.0 / period, s.nodal, s.bar_before, s.cable_before, None)
 
     def _correct(self, measured: Measurement) -> tuple[Array, Array]:
         """End position and normal, corrected by what the tip ring's markers say."""

@@ -61,8 +61,16 @@ class SimulatedPlant:
         self._precision: type = np.float32  # as cameras deliver them
         self._random = np.random.default_rng(seed)
         drive, rest = _start(settings, robot)
-        self._state = dynamics.rest_state(rest.q, drive)
-        self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
+        slip = None
+        if settings.friction is not None:
+            f = settings.friction
+            row = [f.coefficient, np.radians(f.least_wrap_deg), f.drag_n]
+            holes = np.tile(row, (robot.model.hole_nodes.shape[0], 1))
+            slip = dynamics.unworn(robot.model, rest.q, drive, rest.tension, holes)
+        self._state = dynamics.rest_state(rest.q, drive, slip)
+        self._work = make_workspace(robot.model, rubbing=slip is not None)
+        self._scratch = dynamics.make_scratch(robot.model)
+        self._scratch.lead[:] = dynamics.lead_direction(rest.q)
         self._work.tension[:] = rest.tension
         self._rows = np.array(ring_rows(robot.n_modules))
         self._rings = module_of(self._rows)

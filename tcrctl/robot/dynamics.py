@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tcrctl.elements import bar, sliding_cable
+from tcrctl.elements import bar, rubbing_cable, sliding_cable
+from tcrctl.elements.rubbing_cable import Slip, Stretches
 from tcrctl.numerics.generalized_alpha import coefficients
-from tcrctl.robot.equations import FORCE, Q_FREE, Load, Workspace
+from tcrctl.robot.equations import FORCE, Q_FREE, Load, Workspace, make_workspace
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import SIZE
 from tcrctl.robot.potential import Outcome, minimise
@@ -36,6 +37,7 @@ class State(NamedTuple):
         acceleration: q̈ [m/s2].
         auxiliary: The acceleration-like variable a of (14) [m/s2].
         drive: Drive lengths (m,) [m].
+        slip: Where the cables' material lies in their holes; None: they do not rub.
     """
 
     q: Array
@@ -43,6 +45,7 @@ class State(NamedTuple):
     acceleration: Array
     auxiliary: Array
     drive: Array
+    slip: Slip | None
 
 
 class Rule(NamedTuple):
@@ -68,11 +71,45 @@ class Scratch(NamedTuple):
     bar_before: Array
     bar_rate: Array
     cable_before: Array
+    lead: Array
 
 
-def rest_state(q: Array, drive: Array) -> State:
+def rest_state(q: Array, drive: Array, slip: Slip | None = None) -> State:
     """State at rest in configuration ``q`` with ``drive``; copies both."""
-    return State(q.copy(), np.zeros_like(q), np.zeros_like(q), np.zeros_like(q), drive.copy())
+    return State(q.copy(), np.zeros_like(q), np.zeros_like(q), np.zeros_like(q), drive.copy(), slip)
+
+
+def unworn(model: Model, q: Array, drive: Array, tension: Array, holes: Array) -> Slip:
+    """Slip of cables that lie in their holes without any friction force: one tension along each.
+
+    Args:
+        model: Robot arrays.
+        q: Node positions (3 n_nodes,) [m].
+        drive: Drive lengths (m,) [m].
+        tension: Tensions (m,) [N].
+        holes: Friction of every hole (n_holes, 3), columns as in ``elements.rubbing_cable``.
+    """
+    s = make_workspace(model, rubbing=True).stretches
+    cables, first = model.cables, model.first_hole
+    rubbing_cable.measure(q, drive, first, model.hole_nodes, model.hole_weights, cables, s)
+    along = np.repeat(tension, np.diff(first))
+    ea = np.repeat(cables[:, sliding_cable.STIFFNESS] * cables[:, sliding_cable.REST], np.diff(first))
+    rest = s.length / (1.0 + along / ea)
+    slack = (
+        np.repeat(cables[:, sliding_cable.REST], np.diff(first))
+        * s.length
+        / np.repeat(np.add.reduceat(s.length, first[:-1]), np.diff(first))
+    )
+    rest = np.where(along > 0.0, rest, slack)
+    zeros = np.zeros_like(along)
+    return Slip(holes, ea / rest, rest, along, zeros, zeros.copy(), np.zeros(1))
+
+
+def lead_direction(q: Array) -> Array:
+    """Unit vector from the actuators to the base ring (3,): along the base's axis, towards the robot."""
+    r = q[:9].reshape(3, 3)
+    up = np.cross(r[1] - r[0], r[2] - r[0])
+    return -up / np.linalg.norm(up)
 
 
 def make_scratch(model: Model) -> Scratch:
@@ -80,7 +117,7 @@ def make_scratch(model: Model) -> Scratch:
     size, bars, m = SIZE * (model.mass.shape[0] + 1), model.bars.shape[0], model.cables.shape[0]
     return Scratch(
         np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(m), np.zeros((4, size)),
-        np.zeros(bars), np.zeros(bars), np.zeros(m),
+        np.zeros(bars), np.zeros(bars), np.zeros(m), np.array([0.0, 0.0, -1.0]),
     )  # fmt: skip
 
 
@@ -103,6 +140,24 @@ def lengths_before(
         s.cable_before[c] = ws.length[c] + drive[c] + lag * rate
 
 
+@njit(cache=True, error_model="numpy")
+def _begin_slip(
+    model: Model, q: Array, drive: Array, h: float, slip: Slip | None, s: Stretches | None, lead: Array
+) -> None:
+    """Start a step of cables that rub."""
+    if slip is not None:
+        holes, weights = model.hole_nodes, model.hole_weights
+        rubbing_cable.measure(q, drive, model.first_hole, holes, weights, model.cables, s)
+        rubbing_cable.begin(slip, h, lead, model.first_hole, s)
+
+
+@njit(cache=True, error_model="numpy")
+def _finish_slip(model: Model, slip: Slip | None, s: Stretches | None) -> None:
+    """End a step of cables that rub."""
+    if slip is not None:
+        rubbing_cable.finish(slip, model.cables, model.first_hole, s)
+
+
 @njit(inline="always", error_model="numpy")  # compiled once, inside advance
 def try_step(
     model: Model, x: State, speed: Array, h: float, rho: float, external: Array, ws: Workspace, s: Scratch
@@ -110,6 +165,7 @@ def try_step(
     """One generalized-alpha step of size ``h`` [s]; changes ``x`` only if it converges."""
     c = coefficients(rho, h)
     lengths_before(model, x.q, x.v, x.drive, speed, 0.5 * h, s, ws)
+    _begin_slip(model, x.q, x.drive, h, x.slip, ws.stretches, s.lead)
     inertia = c.acceleration + model.damping * c.velocity
     for k in range(x.q.shape[0]):
         aux = (x.acceleration[k] - c.alpha_m * x.auxiliary[k]) / (1.0 - c.alpha_m)
@@ -120,9 +176,10 @@ def try_step(
         s.nodal[FORCE, k] = external[k]
     for i in range(speed.shape[0]):
         s.drive[i] = x.drive[i] + h * speed[i]
-    load = Load(inertia, 2.0 / h, s.nodal, s.bar_before, s.cable_before)
+    load = Load(inertia, 2.0 / h, s.nodal, s.bar_before, s.cable_before, x.slip)
     outcome = minimise(model, s.q, s.drive, load, ws, TOLERANCE, np.int64(MAX_ITERATIONS), np.bool_(False))
     if outcome.converged:
+        _finish_slip(model, x.slip, ws.stretches)
         for k in range(x.q.shape[0]):
             moved = s.q[k] - s.q0[k]
             aux = (x.acceleration[k] - c.alpha_m * x.auxiliary[k]) / (1.0 - c.alpha_m)

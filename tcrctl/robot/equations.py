@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tcrctl.elements import bar, sliding_cable
+from tcrctl.elements import bar, rubbing_cable, sliding_cable
+from tcrctl.elements.rubbing_cable import Slip, Stretches
 from tcrctl.robot import tangent
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
@@ -37,7 +38,8 @@ class Load(NamedTuple):
         w: d(dl/dt)/dl of the rule [1/s].
         nodal: Rows q̃ [m], f_ext with gravity [N], diagonal of S [N/m], q_s [m] (4, 3 n_nodes).
         bar_before: l_before of the bars (n_bars,) [m].
-        cable_before: (l + d)_before of the cables (m,) [m].
+        cable_before: (l + d)_before of the cables (m,) [m]; not read where cables rub.
+        slip: Where the cables' material lies in their holes; None: without friction it slips freely.
     """
 
     inertia: float
@@ -45,6 +47,7 @@ class Load(NamedTuple):
     nodal: Array
     bar_before: Array
     cable_before: Array
+    slip: Slip | None
 
 
 class Workspace(NamedTuple):
@@ -54,12 +57,13 @@ class Workspace(NamedTuple):
         K: Block-banded part of the tangent (n_modules, w + 1, 12, 12) [N/m].
         U: Its Cholesky factor, same shape.
         r: Residual of (*) for the free coordinates (12 n_modules,) [N].
-        G: ∂l/∂q (m, 3 n_nodes).
-        tension: λ (m,) [N].
+        G: ∂l/∂q (m, 3 n_nodes); of groups of stretches where cables rub.
+        tension: λ (m,) [N]; that at the drives where cables rub.
         axial: k_c = ∂λ/∂(l + d) of taut cables, 0 of slack ones (m,) [N/m].
         length: Path lengths l (m,) [m].
         columns: Cable columns and right-hand side of ``linear.couple`` (12 n_modules, m + 1).
         small: Its factor of the cable coupling (m, m).
+        stretches: Of cables that rub; None without friction.
     """
 
     K: Array
@@ -71,22 +75,44 @@ class Workspace(NamedTuple):
     length: Array
     columns: Array
     small: Array
+    stretches: Stretches | None
 
 
-def make_workspace(model: Model) -> Workspace:
-    """Allocate the arrays for ``model``."""
+def _stretches(model: Model, rows: int) -> Stretches:
+    """Allocate the arrays of cables that rub, ``rows`` groups of stretches at most."""
+    holes, size = model.hole_nodes.shape[0], SIZE * model.mass.shape[0]
+    return Stretches(
+        length=np.zeros(holes),
+        direction=np.zeros((holes, 3)),
+        tension=np.zeros(holes),
+        axial=np.zeros(holes),
+        stiffness=np.ones(holes),
+        wanted=np.zeros(holes),
+        alone=np.zeros(holes),
+        knots=np.zeros((2, 4 * holes + 4)),
+        groups=np.zeros(1, dtype=np.int64),
+        columns=np.zeros(size * (rows + 1)),
+        small=np.zeros(rows * rows),
+    )
+
+
+def make_workspace(model: Model, *, rubbing: bool = False) -> Workspace:
+    """Allocate the arrays for ``model``; ``rubbing``: for loads with slip."""
     n, m = model.mass.shape[0], model.cables.shape[0]
+    if rubbing:
+        m = max(m, model.hole_nodes.shape[0] // 2)
     shape = (n, model.bandwidth + 1, SIZE, SIZE)
     return Workspace(
         K=np.zeros(shape),
         U=np.zeros(shape),
         r=np.zeros(SIZE * n),
         G=np.zeros((m, SIZE * (n + 1))),
-        tension=np.zeros(m),
+        tension=np.zeros(model.cables.shape[0]),
         axial=np.zeros(m),
-        length=np.zeros(m),
+        length=np.zeros(model.cables.shape[0]),
         columns=np.zeros((SIZE * n, m + 1)),
         small=np.zeros((m, m)),
+        stretches=_stretches(model, m) if rubbing else None,
     )
 
 
@@ -115,6 +141,64 @@ def _add_bars(q: Array, nodes: np.ndarray, bars: Array, w: float, before: Array,
 
 
 @njit(cache=True, error_model="numpy")
+def _pull(r: Array, nodes: np.ndarray, weights: Array, h: int, T: float, e: Array) -> None:
+    """Add tension T along e, the direction of the stretch before, at hole ``h`` to the residual."""
+    for i in range(3):
+        f = T * weights[h, i]
+        if f != 0.0:
+            _add_force(r, nodes[h, i], f * e[0], f * e[1], f * e[2])
+
+
+@njit(cache=True, error_model="numpy")
+def _group_row(model: Model, s: Stretches, start: int, end: int, row: Array) -> None:
+    """Fill ``row`` (3 n_nodes,) with the gradient of the length of stretches ``start`` .. ``end``."""
+    for k in range(row.shape[0]):
+        row[k] = 0.0
+    for h in range(start, end + 1):
+        for side in range(2):
+            sign, hole = 2.0 * side - 1.0, h - 1 + side
+            for i in range(3):
+                f, node = sign * model.hole_weights[hole, i], 3 * model.hole_nodes[hole, i]
+                for a in range(3):
+                    row[node + a] += f * s.direction[h, a]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_groups(model: Model, c: int, ws: Workspace, s: Stretches) -> None:
+    """Stiffness of the groups of cable ``c``: one stretch goes into ``axial`` of the banded part, several share a row."""
+    first, end = model.first_hole[c], model.first_hole[c + 1] - 1
+    while end > first:
+        start = rubbing_cable.group_start(s, first, end)
+        axial, inside = rubbing_cable.group_stiffness(s, start, end), max(start, first + 1)
+        if inside == end:
+            s.axial[end] = axial
+        elif axial > 0.0:
+            row = s.groups[0]
+            s.groups[0] += 1
+            ws.axial[row] = axial
+            _group_row(model, s, inside, end, ws.G[row])
+        end = start - 1
+
+
+@njit(cache=True, error_model="numpy")
+def _add_rubbing(model: Model, q: Array, drive: Array, slip: Slip, s: Stretches, ws: Workspace) -> float:
+    """Add cables that rub in their holes to r, fill their stretches and groups; return their potential [J]."""
+    cables, first = model.cables, model.first_hole
+    rubbing_cable.measure(q, drive, first, model.hole_nodes, model.hole_weights, cables, s)
+    energy = rubbing_cable.tensions(slip, cables, first, s)
+    s.groups[0] = 0
+    for c in range(drive.shape[0]):
+        ws.tension[c], ws.length[c] = s.tension[first[c]], cables[c, sliding_cable.LEAD]
+        for h in range(first[c] + 1, first[c + 1]):
+            ws.length[c] += s.length[h]
+            s.axial[h] = 0.0
+            _pull(ws.r, model.hole_nodes, model.hole_weights, h, s.tension[h], s.direction[h])
+            _pull(ws.r, model.hole_nodes, model.hole_weights, h - 1, -s.tension[h], s.direction[h])
+        _add_groups(model, c, ws, s)
+    return energy
+
+
+@njit(cache=True, error_model="numpy")
 def _add_cables(model: Model, q: Array, drive: Array, load: Load, ws: Workspace) -> float:
     """Add all cables to r, fill G, tension, axial, length; return their potential [J]."""
     cables = model.cables
@@ -131,6 +215,22 @@ def _add_cables(model: Model, q: Array, drive: Array, load: Load, ws: Workspace)
         for k in range(ws.r.shape[0]):
             ws.r[k] += T * ws.G[c, 3 * FIXED + k]
     return energy
+
+
+@njit(cache=True, error_model="numpy")
+def _add_all_cables(
+    model: Model,
+    q: Array,
+    drive: Array,
+    load: Load,
+    slip: Slip | None,
+    stretches: Stretches | None,
+    ws: Workspace,
+) -> float:
+    """Add the cables, with or without friction in their holes: which, is compiled in."""
+    if slip is None:
+        return _add_cables(model, q, drive, load, ws)
+    return _add_rubbing(model, q, drive, slip, stretches, ws)
 
 
 @njit(cache=True, error_model="numpy")
@@ -167,7 +267,17 @@ def residual(model: Model, q: Array, drive: Array, load: Load, ws: Workspace) ->
     """
     energy = _start(q, model.mass, load.inertia, load.nodal, ws.r)
     energy += _add_bars(q, model.bar_nodes, model.bars, load.w, load.bar_before, ws.r)
-    return energy + _add_cables(model, q, drive, load, ws)
+    return energy + _add_all_cables(model, q, drive, load, load.slip, ws.stretches, ws)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_cable_tangent(model: Model, q: Array, stretches: Stretches | None, ws: Workspace) -> None:
+    """Add the banded part of the cables' tangent."""
+    nodes, weights = model.hole_nodes, model.hole_weights
+    if stretches is None:
+        tangent.add_cables(ws.K, q, model.first_hole, nodes, weights, ws.tension)
+    else:
+        tangent.add_stretches(ws.K, model.first_hole, nodes, weights, stretches)
 
 
 @njit(cache=True, error_model="numpy")
@@ -175,7 +285,7 @@ def fill_tangent(model: Model, q: Array, load: Load, ws: Workspace) -> None:
     """Fill ``ws.K`` at ``q``, where :func:`residual` has been evaluated last."""
     tangent.start(ws.K, model.mass, load.inertia, load.nodal[SPRING])
     tangent.add_bars(ws.K, q, model.bar_nodes, model.bars, load.w, load.bar_before)
-    tangent.add_cables(ws.K, q, model.first_hole, model.hole_nodes, model.hole_weights, ws.tension)
+    _add_cable_tangent(model, q, ws.stretches, ws)
 
 
 @njit(cache=True, error_model="numpy")

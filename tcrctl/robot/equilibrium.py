@@ -52,7 +52,7 @@ def static_load(model: Model, external: Array) -> Load:
     """Load of statics: no inertia, no damping, external force (3 n_nodes,) [N] with gravity in it."""
     nodal = np.zeros((4, external.shape[0]))
     nodal[FORCE] = external
-    return Load(0.0, 0.0, nodal, np.zeros(model.bars.shape[0]), np.zeros(model.cables.shape[0]))
+    return Load(0.0, 0.0, nodal, np.zeros(model.bars.shape[0]), np.zeros(model.cables.shape[0]), None)
 
 
 def _in_steps(

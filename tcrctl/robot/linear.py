@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from tcrctl.elements.rubbing_cable import Stretches
 from tcrctl.numerics import block_banded
 from tcrctl.robot.equations import Workspace
 from tcrctl.robot.module import FIXED
@@ -63,6 +64,19 @@ def factor_shifted(K: Array, U: Array) -> float:
             return shift
         shift *= SHIFT_GROWTH
     return -1.0
+
+
+@njit(cache=True, error_model="numpy")
+def in_use(ws: Workspace, stretches: Stretches | None) -> Workspace:
+    """``ws`` with as many rank-1 rows as are in use: cables, or groups of stretches of cables that rub."""
+    if stretches is None:
+        return ws
+    r, size = stretches.groups[0], ws.r.shape[0]
+    columns = stretches.columns[: size * (r + 1)].reshape((size, r + 1))
+    small = stretches.small[: r * r].reshape((r, r))
+    return Workspace(
+        ws.K, ws.U, ws.r, ws.G[:r], ws.tension, ws.axial[:r], ws.length, columns, small, stretches
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -117,7 +117,7 @@ def minimise(
             return Outcome(shift == 0.0 or not stable, iteration, largest, shift)
         if shift < 0.0 or iteration == limit:
             break
-        linear.solve(ws, ws.r, p)
+        linear.solve(linear.in_use(ws, ws.stretches), ws.r, p)
         for i in range(p.shape[0]):
             p[i] = -p[i]
         found, energy = _search(model, q, drive, load, ws, p, energy)

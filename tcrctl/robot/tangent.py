@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from tcrctl.elements import bar, sliding_cable
+from tcrctl.elements.rubbing_cable import Stretches
 from tcrctl.robot.module import FIXED, NODES, SIZE
 from tcrctl.signals import Array
 
@@ -102,3 +103,19 @@ def add_cables(
                 _add_holes(K, nodes, weights, h, h, 1.0, s)
                 _add_holes(K, nodes, weights, h + 1, h + 1, 1.0, s)
                 _add_holes(K, nodes, weights, h, h + 1, -1.0, s)
+
+
+@njit(cache=True, error_model="numpy")
+def add_stretches(K: Array, first_hole: np.ndarray, nodes: np.ndarray, weights: Array, s: Stretches) -> None:
+    """Add every stretch of cables that rub: its tension across, and along it the stiffness of a group of one."""
+    block = np.empty(6)
+    for c in range(first_hole.shape[0] - 1):
+        for h in range(first_hole[c] + 1, first_hole[c + 1]):
+            lateral = s.tension[h] / s.length[h]
+            if lateral == 0.0 and s.axial[h] == 0.0:
+                continue
+            ex, ey, ez = s.direction[h, 0], s.direction[h, 1], s.direction[h, 2]
+            _fill_line(block, s.axial[h], lateral, ex, ey, ez)
+            _add_holes(K, nodes, weights, h - 1, h - 1, 1.0, block)
+            _add_holes(K, nodes, weights, h, h, 1.0, block)
+            _add_holes(K, nodes, weights, h - 1, h, -1.0, block)

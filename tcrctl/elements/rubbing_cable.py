@@ -1,0 +1,271 @@
+"""A cable that rubs in its holes: capstan law with real sticking, in the form of one convex problem per step.
+
+The cable is a chain of stretches: stretch h ends at hole h (stretch 0 is the lead, from the actuator to the base ring),
+and material may slip through every hole but the last, which is the anchor. With the elongation e_h of a stretch at
+slips that have not moved, and the slips s_h of one time step, the incremental potential of a cable is
+
+    min_s  Σ_h k_h/2 (e_h + s_h - s_(h-1))₊²  +  Σ_h F_h |s_h|,        F_h = min(T_h, T_(h+1)) (exp(μ θ_h) - 1) + drag
+
+F_h is lagged: it belongs to the tensions T and wrap angles θ of the last step, which makes the problem convex, and
+dissipation F_h |s_h| never negative. Its dual is a separable quadratic in the tensions under |T_h - T_(h+1)| <= F_h,
+T >= 0, solved exactly by one pass along the chain (dynamic programming on piecewise linear derivatives): holes whose
+bound is not active *stick*, s_h = 0 to the last bit. Stretches between sticking holes form groups whose tensions move
+together, in series: 1 / k = Σ 1 / k_h. Sources: capstan law [SC26]; the dual [CR05].
+"""  # fmt: skip
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from tcrctl.elements import sliding_cable
+from tcrctl.signals import Array
+
+#: Columns of the friction of a hole (n_holes, 3): coefficient μ, least wrap angle [rad], drag [N].
+COEFFICIENT, LEAST_WRAP, DRAG = range(3)
+
+
+class Slip(NamedTuple):
+    """Where the material of all cables lies, and what holds it there; changed in place, all arrays (n_holes,).
+
+    Attributes:
+        holes: Friction of every hole (n_holes, 3), columns as above; anchors are not read.
+        stiffness: k_h = EA / rest length of the stretch that ends at hole h [N/m].
+        rest: Its unstretched length [m].
+        tension: Its tension T_h [N].
+        cap: F_h, largest difference of tension across hole h [N].
+        before: Elongations at the start of the step [m], for the damper.
+        rate: 1 element: w of backward Euler, dl/dt = w (e - before) [1/s]; 0 in statics.
+    """
+
+    holes: Array
+    stiffness: Array
+    rest: Array
+    tension: Array
+    cap: Array
+    before: Array
+    rate: Array
+
+
+class Stretches(NamedTuple):
+    """What one evaluation finds of every stretch; arrays (n_holes,) unless said.
+
+    Attributes:
+        length: Lengths [m]; leads with the drive length.
+        direction: Unit vectors from hole h - 1 to hole h (n_holes, 3).
+        tension: T_h [N].
+        axial: Stiffness of a group that holds one stretch between two rings [N/m]; 0 of all others.
+        stiffness: k_h with the damper of the rule [N/m].
+        wanted: Tensions that the stretches would have if all holes stuck, may be negative [N].
+        alone: T_h at which the chain up to h would rest if it ended there [N].
+        knots: Derivative of the chain's cost by its last tension: places [N] and values [m] of its corners (2, 4 n + 4).
+        groups: 1 element: rows of G in use.
+        columns: Memory of the columns of a solve, flat.
+        small: Memory of its coupling, flat.
+    """
+
+    length: Array
+    direction: Array
+    tension: Array
+    axial: Array
+    stiffness: Array
+    wanted: Array
+    alone: Array
+    knots: Array
+    groups: np.ndarray
+    columns: Array
+    small: Array
+
+
+#: Stands for the infinite slope with which slackness ends the range of tensions at 0 [m].
+WALL = 1e6
+
+
+@njit(cache=True, error_model="numpy")
+def _first_positive(y: Array, n: int) -> int:
+    """Index of the first of n increasing values that is not negative; n if all are."""
+    for i in range(n):
+        if y[i] >= 0.0:
+            return i
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def _root(x: Array, y: Array, n: int, right: float) -> float:
+    """Where the increasing function through n corners (x, y) is zero; y[0] < 0, slope ``right`` behind the last."""
+    i = _first_positive(y, n)
+    if i == n:
+        return float(x[n - 1] - y[n - 1] / right)
+    return float(x[i - 1] - y[i - 1] * (x[i] - x[i - 1]) / (y[i] - y[i - 1]))
+
+
+@njit(cache=True, error_model="numpy")
+def _widen(x: Array, y: Array, n: int, z: float, F: float) -> int:
+    """Put a hole that holds up to F behind the chain: below its root z the function moves down by F, above up by F."""
+    i = _first_positive(y, n)
+    for k in range(n - 1, i - 1, -1):
+        x[k + 2], y[k + 2] = x[k] + F, y[k]
+    for k in range(i):
+        x[k] -= F
+    x[i], y[i] = z - F, 0.0
+    x[i + 1], y[i + 1] = z + F, 0.0
+    return n + 2
+
+
+@njit(cache=True, error_model="numpy")
+def _only_taut(x: Array, y: Array, n: int, right: float) -> int:
+    """Let the function end at tension 0 with a wall; returns the new number of corners."""
+    i = 0
+    while i < n and x[i] <= 0.0:
+        i += 1
+    if i == n:
+        at = y[n - 1] - right * x[n - 1]
+    elif i == 0:
+        at = y[0]  # cannot be: the wall of the last stretch lies at or below -F
+    else:
+        at = y[i - 1] - x[i - 1] * (y[i] - y[i - 1]) / (x[i] - x[i - 1])
+    shift = 2 - i
+    if shift > 0:
+        for k in range(n - 1, i - 1, -1):
+            x[k + shift], y[k + shift] = x[k], y[k]
+    else:
+        for k in range(i, n):
+            x[k + shift], y[k + shift] = x[k], y[k]
+    x[0], y[0], x[1], y[1] = 0.0, -WALL, 0.0, at
+    return n + shift
+
+
+@njit(cache=True, error_model="numpy")
+def solve_chain(s: Stretches, cap: Array, first: int, last: int) -> None:
+    """Tensions of one cable, stretches ``first`` .. ``last``: fills tension and alone from wanted and stiffness."""
+    x, y = s.knots[0], s.knots[1]
+    x[0], y[0], x[1], y[1] = 0.0, -WALL, 0.0, -s.wanted[first] / s.stiffness[first]
+    n, right = 2, 1.0 / s.stiffness[first]
+    for h in range(first, last + 1):
+        s.alone[h] = _root(x, y, n, right)
+        if h < last:
+            n = _widen(x, y, n, s.alone[h], cap[h])
+            n = _only_taut(x, y, n, right)
+            k = s.stiffness[h + 1]
+            for i in range(n):
+                y[i] += (x[i] - s.wanted[h + 1]) / k
+            right += 1.0 / k
+    s.tension[last] = s.alone[last]
+    for h in range(last - 1, first - 1, -1):
+        T, F = s.tension[h + 1], cap[h]
+        s.tension[h] = min(max(s.alone[h], T - F), T + F)
+
+
+@njit(cache=True, error_model="numpy")
+def measure(
+    q: Array,
+    drive: Array,
+    first_hole: np.ndarray,
+    nodes: np.ndarray,
+    weights: Array,
+    cables: Array,
+    s: Stretches,
+) -> None:
+    """Fill lengths and directions of all stretches; arguments as in ``sliding_cable``."""
+    for c in range(drive.shape[0]):
+        first = first_hole[c]
+        s.length[first] = cables[c, sliding_cable.LEAD] + drive[c]
+        for h in range(first + 1, first_hole[c + 1]):
+            s.length[h], s.direction[h, 0], s.direction[h, 1], s.direction[h, 2] = sliding_cable.segment(
+                q, nodes, weights, h - 1
+            )
+
+
+@njit(cache=True, error_model="numpy")
+def tensions(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) -> float:
+    """Fill tensions of all stretches from their lengths; returns the incremental potential of all cables [J].
+
+    Args:
+        slip: State at the start of the step.
+        cables: Parameters (m, 4), columns as in ``sliding_cable``; the damper acts on every stretch with c / k.
+        first_hole: First hole of every cable, and the end (m + 1,).
+        s: Lengths in, tensions out.
+    """
+    energy = 0.0
+    for c in range(cables.shape[0]):
+        first, last = first_hole[c], first_hole[c + 1] - 1
+        b = slip.rate[0] * cables[c, sliding_cable.DAMPING] / cables[c, sliding_cable.STIFFNESS]
+        for h in range(first, last + 1):
+            s.stiffness[h] = slip.stiffness[h] * (1.0 + b)
+            elongation = s.length[h] - slip.rest[h] - b * slip.before[h] / (1.0 + b)
+            s.wanted[h] = s.stiffness[h] * elongation
+        solve_chain(s, slip.cap, first, last)
+        for h in range(first, last + 1):
+            T = s.tension[h]
+            energy += T * (s.wanted[h] - 0.5 * T) / s.stiffness[h]
+    return energy
+
+
+@njit(cache=True, error_model="numpy")
+def group_start(s: Stretches, first: int, h: int) -> int:
+    """First stretch of the group that ends with stretch ``h``: holes between them slip."""
+    while h > first and s.tension[h - 1] != s.alone[h - 1]:
+        h -= 1
+    return h
+
+
+@njit(cache=True, error_model="numpy")
+def group_stiffness(s: Stretches, start: int, end: int) -> float:
+    """Stiffness of stretches ``start`` .. ``end`` in series [N/m]; 0 if slackness holds their tension."""
+    if s.alone[end] <= 0.0:
+        return 0.0
+    compliance = 0.0
+    for h in range(start, end + 1):
+        compliance += 1.0 / s.stiffness[h]
+    return float(1.0 / compliance)
+
+
+@njit(cache=True, error_model="numpy")
+def begin(slip: Slip, h: float, lead: Array, first_hole: np.ndarray, s: Stretches) -> None:
+    """Start a step of size ``h`` [s]: elongations before it, and the caps of the holes there.
+
+    Args:
+        slip: State; its before, cap and rate are filled.
+        h: Step [s].
+        lead: Unit vector from the actuators to the base ring (3,).
+        first_hole: First hole of every cable, and the end (m + 1,).
+        s: Lengths and directions at the start of the step.
+    """
+    slip.rate[0] = 1.0 / h
+    for c in range(first_hole.shape[0] - 1):
+        first, last = first_hole[c], first_hole[c + 1] - 1
+        for k in range(first, last + 1):
+            slip.before[k] = s.length[k] - slip.rest[k]
+            if k < last:
+                along = 0.0
+                for i in range(3):
+                    along += (lead[i] if k == first else s.direction[k, i]) * s.direction[k + 1, i]
+                wrap = max(np.arccos(min(along, 1.0)), slip.holes[k, LEAST_WRAP])
+                smaller = min(slip.tension[k], slip.tension[k + 1])
+                slip.cap[k] = slip.holes[k, DRAG] + smaller * np.expm1(slip.holes[k, COEFFICIENT] * wrap)
+
+
+@njit(cache=True, error_model="numpy")
+def finish(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) -> float:
+    """Move the material through the holes to the end of a step; returns the work of friction Σ F |s| [J].
+
+    A hole that sticks lets nothing through; a slack stretch takes what comes if it can.
+    """
+    work = 0.0
+    for c in range(cables.shape[0]):
+        first, last = first_hole[c], first_hole[c + 1] - 1
+        b = slip.rate[0] * cables[c, sliding_cable.DAMPING] / cables[c, sliding_cable.STIFFNESS]
+        moved = 0.0
+        for k in range(first, last + 1):
+            before, T = moved, s.tension[k]
+            free = s.length[k] - slip.rest[k]
+            elongation = T / s.stiffness[k] + b * slip.before[k] / (1.0 + b)
+            sticks = T > 0.0 and T == s.alone[k]
+            loose = T == 0.0 and free - before <= elongation
+            moved = 0.0 if k == last or sticks or loose else before + elongation - free
+            work += slip.cap[k] * abs(moved) if k < last else 0.0
+            slip.rest[k] -= moved - before
+            slip.tension[k] = T
+    return work
