@@ -92,7 +92,15 @@ class InstantaneousOptimalControl:
             lcp_residual=solution.residual,
             lcp_pivots=solution.pivots,
             reason=reason,
+            expected=None if reason else self._expected(at.outputs[:3], forecast, solution),
         )
+
+    def _expected(self, now: Array, forecast: Forecast, solution: Solution) -> Array:
+        """Return the end position (3,) [m] one period from now, between now and the first instant."""
+        free, gain = forecast.prediction
+        first = free[0, :3] + gain[0, :3] @ solution.inputs
+        expected: Array = now + (first - now) * (self._settings.period_s / self.ahead[0])
+        return expected
 
     def _free_changes(self, forecast: Forecast, reference: Reference, previous: Array) -> Array:
         """Return changes of speed that cost nothing (blocks * m,) [m/s]; see the module ``feedforward``."""

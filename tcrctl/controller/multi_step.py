@@ -24,13 +24,14 @@ from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning
 from tcrctl.controller.settings import MultiStepSettings
-from tcrctl.memory import POSITION, SPEED, Kept
+from tcrctl.memory import POSITION, SPEED, TENSION, Kept
 from tcrctl.robot import linear, pose, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
 from tcrctl.robot.potential import Outcome, minimise
+from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
 from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, StaticMap, follow, rest_map
 from tcrctl.signals import Array, Estimate
@@ -120,6 +121,10 @@ class MultiStep:
         basis = response.start_basis(robot.model, self._work, settings.modes)
         self._memory = Memory(at, still, still.copy(), basis)
         self._solved = False
+        offset, gap = settings.offset, settings.tension_gap
+        self._fresh = offset is not None and offset.from_start
+        self._gap_blend = 0.0 if gap is None else -float(np.expm1(-period / gap.filter_s))
+        self._gap: Array | None = None
 
     def sharpen(self) -> None:
         """See :class:`tcrctl.controller.inner_map.Linearisable`."""
@@ -137,6 +142,7 @@ class MultiStep:
         return {
             "offset": Kept(self._memory.offset[first:], POSITION),
             "last_v": Kept(self._memory.v[first:], SPEED),
+            **({} if self._gap is None else {"tension_gap": Kept(self._gap, TENSION)}),
         }
 
     def inner_map(self) -> InnerMap | None:
@@ -149,12 +155,28 @@ class MultiStep:
         del speed  # the prediction is linear: it does not depend on the last input
         robot, memory = self._robot, self._memory
         now = Now(estimate.q + age * estimate.v, estimate.v, estimate.drive, outputs)
+        tuning = self._tuning
+        if self._fresh:  # the robot rests: all of its deviation is offset
+            memory.v[:], tuning, self._fresh = estimate.v, tuning._replace(blend=1.0), False
         outcome, stable, free, gain = forecast(
-            robot.model, self._load, self._work, memory, now, self.grid, robot.tip, self._tuning
+            robot.model, self._load, self._work, memory, now, self.grid, robot.tip, tuning
         )
+        if self._gap_blend and outcome.converged:
+            free[:, POSE_ROWS:] -= self._lasting_gap(estimate.tension - self._work.tension)
         good, self._solved = outcome.converged and stable, outcome.converged
         reason = "" if good else "the model has no stable equilibrium at the present drives"
         at_rest = None
         if self._feedforward:
             at_rest = pose.drive_gain(memory.at.equilibrium, memory.at.gain, robot.tip)[:6]
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)
+
+    def _lasting_gap(self, gap: Array) -> Array:
+        """Return what lasts of the difference between the estimated and the model's tensions (m,) [N].
+
+        A millimetre of length error is 1.5 N, so tensions read off marker positions are wrong by newtons for ever,
+        and a controller that believes them winds in or pays out. Only what changes faster than the filter is believed.
+        """
+        if self._gap is None:
+            self._gap = gap
+        self._gap = self._gap + self._gap_blend * (gap - self._gap)
+        return self._gap

@@ -58,6 +58,7 @@ class Plan:
         lcp_residual: Complementarity residual of the LCP solution.
         lcp_pivots: Pivots of Lemke's algorithm.
         reason: Empty, or why the speeds must not be sent.
+        expected: End position one period from now (3,) [m], if the plan tells.
     """
 
     speed: Array
@@ -67,6 +68,7 @@ class Plan:
     lcp_residual: float = 0.0
     lcp_pivots: int = 0
     reason: str = ""
+    expected: Array | None = None
 
 
 class Planner(Linearisable, Protocol):

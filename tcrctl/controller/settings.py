@@ -62,6 +62,26 @@ class OffsetSettings(Settings):
     """Estimates where the robot would come to rest, as opposed to where the model would."""
 
     filter_s: float = quantity("s", "time constant of the estimate", 0.3, gt=0)
+    from_start: bool = Field(default=True, description="begin with the first frame's offset instead of none")
+
+
+class TensionGapSettings(Settings):
+    """Cable tensions are not read off positions alone: lasting differences from the model's are left out."""
+
+    filter_s: float = quantity("s", "time constant after which a difference counts as lasting", 1.0, gt=0)
+
+
+class DitherSettings(Settings):
+    """Fast small motion of the drives against friction; as large as the prediction is wrong."""
+
+    frequency_hz: float = quantity("Hz", "frequency of the triangle wave", 5.0, gt=0, le=100)
+    least_mm: float = quantity("mm", "smallest amplitude, there from the start", 0.0, ge=0, le=5)
+    most_mm: float = quantity("mm", "largest amplitude", 2.0, gt=0, le=5)
+    threshold_mm: float = quantity("mm", "innovation of the end position that is not friction", 0.3, gt=0)
+    growth_1_s: float = quantity("1/s", "growth of the amplitude by innovation beyond the threshold", 1.0, gt=0)
+    release_s: float = quantity("s", "time constant of its decay", 100.0, gt=0)
+    filter_s: float = quantity("s", "time constant of the innovation's size", 0.5, gt=0)
+    outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
 
 
 class MultiStepSettings(Settings):
@@ -76,6 +96,9 @@ class MultiStepSettings(Settings):
     modes: int = Field(default=MODES, ge=1, le=60, description="modes of the response; model: dynamic only")
     offset: OrOff[OffsetSettings] = Field(
         default=OffsetSettings(), description="offset of the equilibrium, or off"
+    )
+    tension_gap: OrOff[TensionGapSettings] = Field(
+        default=TensionGapSettings(), description="lasting differences of tension, left out, or off"
     )
     feedforward: bool = Field(
         default=True,
@@ -170,6 +193,9 @@ class IocSettings(Settings):
     )
     integral: OrOff[IntegralSettings] = Field(
         default=IntegralSettings(), description="integral action, or off"
+    )
+    dither: OrOff[DitherSettings] = Field(
+        default=DitherSettings(), description="keeps cables from sticking in their holes, or off"
     )
     speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
 

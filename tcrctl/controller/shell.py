@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tcrctl.controller.cost import input_limits, outputs, pose_error
+from tcrctl.controller.dither import Dither
 from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.plan import Planner, Situation
@@ -36,14 +37,19 @@ class Shell:
         self._normal = robot.rest_normal if settings.output == "pose" else None
         self._speed = np.zeros(robot.n_cables)
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
+        dither = settings.dither if isinstance(settings, IocSettings) else None
+        self.dither = Dither(dither, settings.period_s, robot)
         self.ahead = planner.ahead
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Return the command for the coming period; the drives are held if no trustworthy one was found."""
         at = self._situation(estimate, reference)
+        self.dither.observe(at.outputs[:3])
         plan = self._planner.plan(at)
         reason = at.doubt or plan.reason
         self._speed = np.zeros(self._robot.n_cables) if reason else at.within(plan.speed)
+        self.dither.expect(None if reason else plan.expected)
+        speed = self._speed if reason else at.within(self._speed + self.dither.speed())
         limit = self._settings.speed_limit_mm_s / 1000.0
         self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
         info = ControlInfo(
@@ -57,7 +63,7 @@ class Shell:
             integral=at.shift,
             reason=reason,
         )
-        return Command(self._speed, estimate.drive + self._settings.period_s * self._speed), info
+        return Command(speed, estimate.drive + self._settings.period_s * speed), info
 
     def _situation(self, estimate: Estimate, reference: Reference) -> Situation:
         """Move the integral action on, and gather what the planner is told."""
@@ -91,6 +97,7 @@ class Shell:
         return {
             "speed": Kept(self._speed, SPEED),
             **self._integral.memory(self._normal),
+            **self.dither.memory(),
             **self._planner.memory(),
         }
 

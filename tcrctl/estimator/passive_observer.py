@@ -15,6 +15,7 @@ the measured tip ring and the model's; while the tip ring is not seen, the last 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,6 +32,8 @@ from tcrctl.signals import Array, Command, Estimate, Measurement
 #: Largest nodal force left by an update [N]: against the virtual springs, 5 nanometres.
 TOLERANCE = 1e-4
 MAX_ITERATIONS = 30
+#: The same for the first frame, which may lie far from the model's rest.
+FIT_ITERATIONS = 80
 
 
 class PassiveObserver:
@@ -48,6 +51,8 @@ class PassiveObserver:
         self._still = np.zeros(robot.n_cables)
         self._correction = np.zeros(6)
         self._updates = 0
+        self._fits, self._holds = settings.fit_start, settings.hold_blank
+        self._last: Measurement | None = None
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._scratch.nodal[FORCE] = robot.weight
         self._valid, self._seen = np.zeros(rows.shape[0], dtype=np.bool_), self._coordinates[:0]
@@ -65,6 +70,25 @@ class PassiveObserver:
         s.nodal[SPRING_AT, self._seen] = measured.nodes[self._valid].ravel()
         dynamics.lengths_before(model, self._q, self._v, self._drive, self._still, 0.0, s, self._work)
         return Load(inertia, 1.0 / period, s.nodal, s.bar_before, s.cable_before, None)
+
+    def _held(self, measured: Measurement) -> Measurement:
+        """Return the frame, or the last one with markers in the place of a blank one."""
+        if measured.valid.any():
+            self._last = measured
+        elif self._holds and self._last is not None:
+            return replace(measured, nodes=self._last.nodes, valid=self._last.valid)
+        return measured
+
+    def _fit(self, measured: Measurement) -> bool:
+        """Fit the resting model to a frame by statics, so that the robot does not seem to jump there in a step."""
+        if not measured.valid.any():
+            return False
+        still = self._load(measured)._replace(inertia=0.0, w=0.0)
+        q, drive = self._q.copy(), measured.drive.copy()
+        if minimise(self._robot.model, q, drive, still, self._work, TOLERANCE, FIT_ITERATIONS, False).converged:
+            self._q, self._drive = q, drive
+            self._v = np.zeros_like(q)
+        return True
 
     def _correct(self, measured: Measurement) -> tuple[Array, Array]:
         """End position and normal, corrected by what the tip ring's markers say."""
@@ -94,6 +118,9 @@ class PassiveObserver:
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Step the model to the time of ``measured``; the drives are those that it reports."""
         del applied
+        measured = self._held(measured)
+        if self._fits:
+            self._fits = not self._fit(measured)
         load = self._load(measured)
         q = self._q.copy()
         model, drive = self._robot.model, measured.drive

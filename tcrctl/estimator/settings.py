@@ -24,6 +24,12 @@ class PassiveObserverSettings(Settings):
     pose_filter_s: float = quantity(
         "s", "time constant of the end pose's correction by the measured tip ring", 0.5, gt=0
     )
+    fit_start: bool = Field(
+        default=True, description="begin with the model fitted to the first frame, at rest, instead of its own rest"
+    )
+    hold_blank: bool = Field(
+        default=True, description="a frame without any marker repeats the last one, instead of none"
+    )
 
 
 class ExactSettings(Settings):
