@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -17,13 +17,15 @@ from tcrctl.estimator.exact import State
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.experiment.metrics import Metrics
-from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
+from tcrctl.experiment.plant_robot import robot_of_plant
+from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, with_draws
 from tcrctl.loop.loop import run_loop, step_count
 from tcrctl.loop.pacing import Unpaced
 from tcrctl.loop.safety import SafetyLimits
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.rig.bench import build_rig
 from tcrctl.plant.rig.session import Session
+from tcrctl.plant.realistic import rehearsal_plant
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
@@ -109,7 +111,8 @@ def _simulated(experiment: Experiment, session: Session) -> tuple[RunnablePlant,
     spec = experiment.spec
     if not isinstance(spec.plant, SimulatedSettings):
         raise InputError(f"plant.kind is {spec.plant.kind}, not simulated")
-    plant = SimulatedPlant(spec.plant, experiment.robot, experiment.period, spec.seed)
+    own = robot_of_plant(spec.plant, experiment.loaded, experiment.robot, spec.seed)
+    plant = SimulatedPlant(spec.plant, own, experiment.period, spec.seed)
     return plant, plant.state
 
 
@@ -135,8 +138,7 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
         InputError: If robot, trajectory and controller do not go together.
         NoEquilibriumError: If the robot has no stable shape.
     """
-    changes: dict[str, Any] = {} if seed is None else {"seed": seed}
-    spec = loaded.spec.model_copy(update=changes)
+    spec = with_draws(loaded.spec, len(loaded.robot.cables.routes), seed)
     with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
         robot = build_robot(loaded.robot)
         trajectory = make_trajectory(spec, robot)
@@ -240,8 +242,7 @@ def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple
 
 def _rehearse(experiment: Experiment) -> None:
     """Run a few steps with parts of its own, in simulation, so that nothing of the run itself is touched."""
-    simulated = SimulatedSettings(kind="simulated")
-    plant = SimulatedPlant(simulated, experiment.robot, experiment.period, experiment.spec.seed)
+    plant = SimulatedPlant(rehearsal_plant(experiment.spec.plant), experiment.robot, experiment.period, experiment.spec.seed)
     parts, metrics = build_parts(experiment, plant, plant.state), Metrics(WARM_UP_STEPS, paced=False)
     task = make_task(experiment)
 
