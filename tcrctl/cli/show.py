@@ -30,7 +30,7 @@ def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_jso
 
 def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
     from tcrctl.config import shipped
-    from tcrctl.experiment.spec import load_spec
+    from tcrctl.experiment.spec import load_spec, with_draws
     from tcrctl.robot.description import load_robot
 
     if robot:
@@ -39,4 +39,5 @@ def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
         from tcrctl.identify.loading import load_identification
 
         return load_identification(name, overrides).spec
-    return load_spec(name, overrides).spec
+    loaded = load_spec(name, overrides)
+    return with_draws(loaded.spec, len(loaded.robot.cables.routes))

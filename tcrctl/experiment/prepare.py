@@ -17,10 +17,12 @@ from tcrctl.estimator.exact import State
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.experiment.metrics import Metrics
-from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
+from tcrctl.experiment.plant_robot import robot_of_plant
+from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, with_draws
 from tcrctl.loop.loop import Parts, run_loop, step_count
 from tcrctl.loop.safety import SafetyGuard, SafetyLimits
 from tcrctl.plant.plant import Plant, RunnablePlant
+from tcrctl.plant.realistic import rehearsal_plant
 from tcrctl.plant.rig.bench import build_rig
 from tcrctl.plant.rig.session import Session
 from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
@@ -87,7 +89,8 @@ def _simulated(
     settings: SimulatedSettings, experiment: Experiment, session: Session
 ) -> tuple[RunnablePlant, State]:
     del session
-    plant = SimulatedPlant(settings, experiment.robot, experiment.period, experiment.spec.seed)
+    own = robot_of_plant(settings, experiment.loaded, experiment.robot, experiment.spec.seed)
+    plant = SimulatedPlant(settings, own, experiment.period, experiment.spec.seed)
     return plant, plant.state
 
 
@@ -117,8 +120,7 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
         InputError: If robot, trajectory and controller do not go together.
         NoEquilibriumError: If the robot has no stable shape.
     """
-    changes: dict[str, Any] = {} if seed is None else {"seed": seed}
-    spec = loaded.spec.model_copy(update=changes)
+    spec = with_draws(loaded.spec, len(loaded.robot.cables.routes), seed)
     with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
         robot = build_robot(loaded.robot)
         trajectory = make_trajectory(spec, robot)
@@ -236,8 +238,8 @@ def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple
 
 def _rehearse(experiment: Experiment) -> None:
     """Run a few steps with parts of its own, in simulation, so that nothing of the run itself is touched."""
-    simulated = SimulatedSettings(kind="simulated")
-    plant = SimulatedPlant(simulated, experiment.robot, experiment.period, experiment.spec.seed)
+    simulated, spec = rehearsal_plant(experiment.spec.plant), experiment.spec
+    plant = SimulatedPlant(simulated, experiment.robot, experiment.period, spec.seed)
     parts, _ = build_parts(experiment, plant, plant.state)
     metrics, task = Metrics(WARM_UP_STEPS, paced=False), make_task(experiment)
 

@@ -9,7 +9,7 @@ import difflib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -21,9 +21,12 @@ from tcrctl.controller.settings import ControllerSettings, IocSettings
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
 from tcrctl.experiment.criterion import CriterionText
+from tcrctl.experiment.plant_robot import plant_robot
 from tcrctl.experiment.summary import TASK, UNITS
+from tcrctl.plant.realistic import as_drawn
+from tcrctl.plant.reality_settings import list_misfits
 from tcrctl.plant.rig.file import LoadedRig, load_rig
-from tcrctl.plant.settings import PlantSettings
+from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
 from tcrctl.task.settings import TaskSettings
@@ -157,6 +160,9 @@ def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[Fi
     on_the_way = [(("trajectory", *keys), lengths) for keys, lengths in spec.trajectory.drives_named()]
     at_start = [(("plant", *keys), lengths) for keys, lengths in spec.plant.drives_named()]
     names = [route.name for route in cable_routes(robot)]
+    if isinstance(spec.plant, SimulatedSettings):
+        for path, message in list_misfits(spec.plant, tuple(names), robot.name):
+            yield ("plant", *path), message
     for keys, lengths in (*on_the_way, *at_start):
         if len(lengths) != len(names):
             has = f"{robot.name} has {len(names)} cables, {', '.join(names)}"
@@ -180,6 +186,7 @@ class LoadedSpec:
         robot_path: File of the robot.
         overrides: ``--set`` arguments, already applied.
         rig: The bench, for ``plant.kind: rig``.
+        plant_robot: The robot of a simulated plant as designed, if it is another one.
         notes: What the user should know about how the file was read.
     """
 
@@ -190,6 +197,7 @@ class LoadedSpec:
     robot_path: Path
     overrides: tuple[str, ...]
     rig: LoadedRig | None = None
+    plant_robot: RobotDescription | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -215,7 +223,22 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     document.refuse(misfits(spec, robot))
     named = spec.plant.rig_file
     rig = None if named is None else load_rig(named, robot, path.parent)
-    return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, notes)
+    own = plant_robot(document, spec, robot, robot_path)
+    return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, own, notes)
+
+
+def with_draws(spec: ExperimentSpec, cables: int, seed: int | None = None) -> ExperimentSpec:
+    """Return an experiment as it runs: with a seed, and with what ``plant.realistic`` draws.
+
+    Args:
+        spec: The experiment.
+        cables: Number of cables of its robot.
+        seed: Seed of everything random; its own if None.
+    """
+    changes: dict[str, Any] = {} if seed is None else {"seed": seed}
+    if isinstance(spec.plant, SimulatedSettings):
+        changes["plant"] = as_drawn(spec.plant, cables, spec.seed if seed is None else seed)
+    return spec.model_copy(update=changes)
 
 
 def _overridden(

@@ -13,8 +13,8 @@ import numpy as np
 from tcrctl.errors import InputError, TcrctlError
 from tcrctl.signals import Array, Command, Measurement, StepRecord, Truth
 
-Limits = Callable[[Command, Measurement], Command]
-"""What a plant makes of a command that it gets after a measurement."""
+Limits = Callable[[Command, Array], Command]
+"""What a plant makes of a command that it gets while its drives shall be at some lengths (m,) [m]."""
 
 
 class RecordingEndedError(TcrctlError):
@@ -50,6 +50,7 @@ class Recorded:
     def __init__(self, steps: Iterator[StepRecord], limits: Limits | None) -> None:
         """Take the steps of a log, and the limits of the plant that was recorded if they are known."""
         self._steps, self._limits, self._next_k, self.limited = steps, limits, 0, None
+        self._set_point: Array | None = None
 
     def read(self) -> Measurement:
         """Move on to the next step and return what was measured.
@@ -61,6 +62,8 @@ class Recorded:
         step = next(self._steps, None)
         if step is None or step.k != self._next_k:
             raise RecordingEndedError(self._next_k, None if step is None else step.k)
+        before = None if self._next_k == 0 else self.step.applied.drive
+        self._set_point = step.measurement.drive if before is None else before
         self.step, self._next_k = step, self._next_k + 1
         return step.measurement
 
@@ -70,7 +73,8 @@ class Recorded:
 
     def write(self, command: Command) -> Command:
         """Return what was applied at that time; what would have been is in ``limited``."""
-        self.limited = None if self._limits is None else self._limits(command, self.step.measurement)
+        known = self._limits is not None and self._set_point is not None
+        self.limited = self._limits(command, self._set_point) if known else None
         return self.step.applied
 
     def close(self) -> None:

@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.settings import NotNegative, OrOff, Positive, Settings, Vector, quantity
+from tcrctl.plant.reality_settings import RealitySettings
 
 
 class Mismatch(Settings):
@@ -64,14 +65,6 @@ class DropoutSettings(Settings):
     duration_s: Positive = quantity("s", "how long it lasts")
 
 
-class FrictionSettings(Settings):
-    """Friction of the cables in their holes."""
-
-    coefficient: float = quantity("1", "coefficient of Coulomb friction in every hole", 0.1, ge=0, le=3)
-    least_wrap_deg: float = quantity("deg", "least angle by which a cable wraps a hole", 2.0, ge=0, le=90)
-    drag_n: float = quantity("N", "friction of a hole whatever the tension", 0.0, ge=0)
-
-
 class PlantSection(Settings):
     """What every ``plant:`` section can be asked, whatever its kind."""
 
@@ -94,7 +87,7 @@ class PlantSection(Settings):
         yield from ()
 
 
-class SimulatedSettings(PlantSection):
+class SimulatedSettings(PlantSection, RealitySettings):
     """The robot's equations of motion, integrated by the generalized-alpha method."""
 
     kind: Literal["simulated"]
@@ -105,7 +98,6 @@ class SimulatedSettings(PlantSection):
         "1", "spectral radius of the integrator at infinite frequency", 0.8, ge=0, le=1
     )
     mismatch: OrOff[Mismatch] = Field(default=None, description="factors on the plant's parameters, or off")
-    friction: OrOff[FrictionSettings] = Field(default=None, description="friction in the cable holes, or off")
     noise_um: float = quantity("um", "standard deviation of every measured coordinate", 0.0, ge=0)
     latency_ms: float = quantity("ms", "age of a measurement when it is read", 0.0, ge=0, le=1000)
     measured_rings: Rings = Field(default="all", description="rings whose three nodes carry markers")

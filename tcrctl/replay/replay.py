@@ -39,10 +39,10 @@ Announce = Callable[[Sequence[Change]], None]
 Record = Callable[[StepRecord], None]
 Watch = Callable[[StepRecord, StepRecord], None]
 
-#: What a plant of each kind makes of a command, where it depends on nothing but the measurement before.
+#: What a plant of each kind makes of a command, where it depends on nothing but where its drives shall be.
 LIMITS: Final[Mapping[str, Callable[[Robot, float], Limits]]] = {
     "simulated": lambda robot, period: (
-        lambda command, measured: within_stroke(command, measured.drive, period, robot.stroke)
+        lambda command, set_point: within_stroke(command, set_point, period, robot.stroke)
     ),
 }
 #: Parts of a step that are fed to the replay, or measured with a clock.

@@ -10,12 +10,34 @@ from tcrctl.robot.module import module_of, node_index
 from tcrctl.robot.sections import (
     CableSettings,
     FreeRoute,
+    FrictionSettings,
+    ModuleSettings,
     Route,
     SpringBetween,
     SpringSettings,
     Stroke,
     Tip,
 )
+
+
+def module_disagreements(modules: ModuleSettings) -> Iterator[Finding]:
+    """Yield what is wrong with the modules that are not like the others."""
+    times = Counter(entry.module for entry in modules.each)
+    for i, entry in enumerate(modules.each):
+        path: Keys = ("modules", "each", i, "module")
+        if entry.module > modules.count:
+            yield path, f"there is no module {entry.module}; modules are 1 to {modules.count}"
+        elif times[entry.module] > 1:
+            yield path, f"module {entry.module} is listed {times[entry.module]} times"
+
+
+def friction_disagreements(friction: FrictionSettings | None, cables: CableSettings) -> Iterator[Finding]:
+    """Yield what is wrong with a list of coefficients."""
+    given = friction.coefficient if friction is not None else 0.0
+    if isinstance(given, tuple) and len(given) != len(cables.routes):
+        names = ", ".join(route.name for route in cables.routes)
+        message = f"there are {len(cables.routes)} cables, {names}, and {len(given)} values"
+        yield ("friction", "coefficient"), message
 
 
 def cable_disagreements(cables: CableSettings, count: int, tension_limit_n: float) -> Iterator[Finding]:
@@ -60,6 +82,20 @@ def spring_disagreements(springs: SpringSettings, count: int) -> Iterator[Findin
         for node in nodes:
             if module_of(node_index(node)) > count:
                 yield path, f"there is no node {node}; modules are base, m1 to m{count}"
+    yield from _unlike_springs(springs, count)
+
+
+def _unlike_springs(springs: SpringSettings, count: int) -> Iterator[Finding]:
+    """Yield what is wrong with the springs that are not like the others."""
+    known = {frozenset(entry.nodes) for entry in springs.entries(count)}
+    times = Counter(frozenset(entry.nodes) for entry in springs.each)
+    for i, entry in enumerate(springs.each):
+        path: Keys = ("springs", "each", i, "nodes")
+        a, b = entry.nodes
+        if frozenset(entry.nodes) not in known:
+            yield path, f"there is no spring between {a} and {b}"
+        elif times[frozenset(entry.nodes)] > 1:
+            yield path, f"the spring between {a} and {b} is listed {times[frozenset(entry.nodes)]} times"
 
 
 def _pair(path: Keys, nodes: tuple[str, str], seen: set[frozenset[str]]) -> Iterator[Finding]:

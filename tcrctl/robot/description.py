@@ -14,11 +14,13 @@ from pydantic import Field, model_validator
 
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding
-from tcrctl.config.settings import Settings, quantity, refuse
+from tcrctl.config.settings import OrOff, Settings, Vector, quantity, refuse
 from tcrctl.robot import checks
 from tcrctl.robot.sections import (
+    BaseSettings,
     CableSettings,
     FreeRoute,
+    FrictionSettings,
     ModuleSettings,
     Name,
     Route,
@@ -26,7 +28,6 @@ from tcrctl.robot.sections import (
     SpringSettings,
     Stroke,
     Tip,
-    Vector,
 )
 
 
@@ -38,6 +39,8 @@ class RobotDescription(Settings):
     modules: ModuleSettings
     springs: SpringSettings
     cables: CableSettings
+    friction: OrOff[FrictionSettings] = Field(default=None, description="friction in the cable holes, or off")
+    base: BaseSettings = BaseSettings()
     damping_1_s: float = quantity("1/s", "mass-proportional damping", 0.0, ge=0)
     gravity_m_s2: Vector = quantity("m/s2", "gravity in the world frame", (0.0, 0.0, -9.81))
     tip: Tip
@@ -51,8 +54,10 @@ class RobotDescription(Settings):
 
     def _disagreements(self) -> Iterator[Finding]:
         count = self.modules.count
+        yield from checks.module_disagreements(self.modules)
         yield from checks.spring_disagreements(self.springs, count)
         yield from checks.cable_disagreements(self.cables, count, self.tension_limit_n)
+        yield from checks.friction_disagreements(self.friction, self.cables)
         yield from checks.tip_disagreements(self.tip, count)
         yield from checks.stroke_disagreements(self.stroke_mm)
 
@@ -108,19 +113,11 @@ def spring_list(robot: RobotDescription) -> tuple[Spring, ...]:
         robot: The robot.
     """
     springs = robot.springs
-    joints = [
-        SpringBetween(nodes=(_joint_node(a, upper), _joint_node(b, upper)))
-        for upper in range(robot.modules.count)
-        for a, b in springs.joint
-    ]
-    further = [e if isinstance(e, SpringBetween) else SpringBetween(nodes=e) for e in springs.between]
-    return tuple(_spring(entry, springs) for entry in joints + further)
-
-
-def _joint_node(name: str, upper: int) -> str:
-    side, node = name.split(".")
-    module = upper if side == "upper" else upper + 1
-    return f"m{module}.{node}" if module else f"base.{node}"
+    own = {frozenset(entry.nodes): entry.model_dump(exclude={"nodes"}, exclude_none=True) for entry in springs.each}
+    entries = springs.entries(robot.modules.count)
+    return tuple(
+        _spring(entry.model_copy(update=own.get(frozenset(entry.nodes), {})), springs) for entry in entries
+    )
 
 
 def _spring(entry: SpringBetween, common: SpringSettings) -> Spring:

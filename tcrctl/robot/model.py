@@ -58,7 +58,7 @@ class Model(NamedTuple):
 
 def _mass_matrix(d: RobotDescription) -> Array:
     """(n_modules, 12, 12): ring by (4), rods consistent, springs lumped on their end nodes [kg]."""
-    blocks = np.repeat(mass_block(d.modules)[None], d.modules.count + 1, axis=0)
+    blocks = np.stack([mass_block(d.modules.of(module)) for module in range(d.modules.count + 1)])
     for spring in spring_list(d):
         for node in (node_index(name) for name in spring.nodes):
             blocks[module_of(node), node % NODES, node % NODES] += spring.mass / 2.0
@@ -67,11 +67,16 @@ def _mass_matrix(d: RobotDescription) -> Array:
 
 def _bars(d: RobotDescription, nodes: Array) -> tuple[NDArray[np.int64], Array]:
     """End nodes and parameters of rods and ring sides of the free modules (RIGID_BARS each), then springs."""
-    section = math.pi / 4.0 * (d.modules.rod_diameter_mm / 1000.0) ** 2
-    ea = d.modules.youngs_modulus_mpa * 1e6 * section
-    pairs = [pair for module in range(1, d.modules.count + 1) for pair in rigid_bars(module)]
-    lengths = [float(np.linalg.norm(nodes[j] - nodes[i])) for i, j in pairs]
-    rows = [[length, ea / length, d.modules.damping_n_s_m, 0.0] for length in lengths]
+    pairs: list[tuple[int, int]] = []
+    rows: list[list[float]] = []
+    for module in range(1, d.modules.count + 1):
+        own = d.modules.of(module)
+        section = math.pi / 4.0 * (own.rod_diameter_mm / 1000.0) ** 2
+        ea = own.youngs_modulus_mpa * 1e6 * section
+        for i, j in rigid_bars(module):
+            length = float(np.linalg.norm(nodes[j] - nodes[i]))
+            pairs.append((i, j))
+            rows.append([length, ea / length, own.damping_n_s_m, 0.0])
     for spring in spring_list(d):
         pairs.append((node_index(spring.nodes[0]), node_index(spring.nodes[1])))
         stiffness = spring.axial_stiffness / spring.natural_length
@@ -114,8 +119,17 @@ def freeze(model: Model) -> Model:
 
 
 def undeformed(d: RobotDescription) -> Array:
-    """Node positions of the straight stack (3 n_nodes,) [m], where no rod is stretched."""
-    return straight_stack(d.modules).ravel()
+    """Node positions of the straight stack (3 n_nodes,) [m], where no rod is stretched, hung from its base."""
+    nodes = straight_stack(d.modules)
+    return (nodes @ _tilt(d).T if any(d.base.tilt_deg) else nodes).ravel()
+
+
+def _tilt(d: RobotDescription) -> Array:
+    """Rotation of the base (3, 3): about x, then about y."""
+    x, y = np.radians(d.base.tilt_deg)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, math.cos(x), -math.sin(x)], [0.0, math.sin(x), math.cos(x)]])
+    about_y = np.array([[math.cos(y), 0.0, math.sin(y)], [0.0, 1.0, 0.0], [-math.sin(y), 0.0, math.cos(y)]])
+    return about_y @ about_x
 
 
 def gravity_force(model: Model, gravity: Array) -> Array:

@@ -112,21 +112,32 @@ def straight_stack(modules: ModuleSettings) -> Array:
     Args:
         modules: Section of the robot file.
     """
-    radius, pitch = modules.ring_diameter_mm / 2000.0, modules.pitch_mm / 1000.0
     nodes = np.zeros((node_count(modules.count), 3))
+    offsets = modules.offsets()
     for module in range(modules.count + 1):
+        own = modules.of(module)
+        radius, height = own.ring_diameter_mm / 2000.0, 0.0 - _depth(modules, module)
         for k, row in enumerate(ring_nodes(module)):
             angle = k * torus.TURN_THIRD
-            nodes[row] = [radius * math.cos(angle), radius * math.sin(angle), -module * pitch]
-        nodes[apex_row(module)] = [0.0, 0.0, -module * pitch - modules.cone_height_mm / 1000.0]
+            nodes[row] = [radius * math.cos(angle), radius * math.sin(angle), height]
+        nodes[apex_row(module)] = [0.0, 0.0, height - own.cone_height_mm / 1000.0]
+    for (module, label), offset in offsets.items():
+        nodes[NODES * module + LABELS.index(label)] += np.array(offset) / 1000.0
     return nodes
+
+
+def _depth(modules: ModuleSettings, module: int) -> float:
+    """Distance of a ring plane of the straight stack below the base [m]."""
+    if not modules.each:
+        return module * (modules.pitch_mm / 1000.0)
+    return math.fsum(modules.of(i).pitch_mm for i in range(1, module + 1)) / 1000.0
 
 
 def mass_block(modules: ModuleSettings) -> Array:
     """Return the masses of one module by node pairs (NODES, NODES) [kg]: ring by (4), rods consistent.
 
     Args:
-        modules: Section of the robot file.
+        modules: Section of the robot file, as it is for that module.
     """
     cell = modules.mass_g / 1000.0
     block = np.zeros((NODES, NODES))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tcrctl.elements import sliding_cable
+from tcrctl.elements import rubbing_cable, sliding_cable
 from tcrctl.robot import pose
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.equilibrium import (
@@ -17,6 +18,7 @@ from tcrctl.robot.equilibrium import (
 )
 from tcrctl.robot.model import Model, build_model, gravity_force, scaled, undeformed, with_load
 from tcrctl.robot.module import FIXED, SIZE, ring_nodes
+from tcrctl.robot.sections import FrictionSettings
 from tcrctl.signals import Array
 
 
@@ -33,6 +35,7 @@ class Robot:
         tip: Row of the first node of the tip ring.
         stroke: Limits of the drive lengths (2,) [m].
         tension_limit: Largest tension allowed [N].
+        holes: Friction of every hole (n_holes, 3), columns as in ``elements.rubbing_cable``; None without.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Robot:
     tip: int
     stroke: tuple[float, float]
     tension_limit: float
+    holes: Array | None = None
 
     def __deepcopy__(self, memo: dict[int, object]) -> Robot:
         """Itself: nothing in it ever changes, and the kernels know its arrays as read-only."""
@@ -110,7 +114,37 @@ def build_robot(description: RobotDescription) -> Robot:
         tip=ring_nodes(description.tip.ring)[0],
         stroke=(low / 1000.0, high / 1000.0),
         tension_limit=description.tension_limit_n,
+        holes=None if description.friction is None else hole_friction(description.friction, model.first_hole),
     )
+
+
+def hole_friction(friction: FrictionSettings, first_hole: NDArray[np.int64]) -> Array:
+    """Friction of every hole (n_holes, 3), columns as in ``elements.rubbing_cable``.
+
+    Args:
+        friction: Common to all holes, or with a coefficient per cable.
+        first_hole: First hole of every cable, and the end (m + 1,).
+    """
+    holes = np.zeros((first_hole[-1], 3))
+    mu = np.broadcast_to(friction.coefficient, first_hole.shape[0] - 1)
+    holes[:, rubbing_cable.COEFFICIENT] = np.repeat(mu, np.diff(first_hole))
+    holes[:, rubbing_cable.LEAST_WRAP] = np.radians(friction.least_wrap_deg)
+    holes[:, rubbing_cable.DRAG] = friction.drag_n
+    return holes
+
+
+def retensioned(robot: Robot, factors: Array) -> Robot:
+    """The same robot strung otherwise: every cable has its tension at zero drive times a factor (m,).
+
+    Raises:
+        NoEquilibriumError: If that robot has no stable shape at zero drive.
+    """
+    tension = factors * robot.rest.tension
+    trial = equilibrium_with_tensions(robot.model, tension, robot.weight, robot.rest.q)
+    ea = robot.model.cables[:, sliding_cable.STIFFNESS] * robot.model.cables[:, sliding_cable.REST]
+    model = with_rest_lengths(robot.model, trial.length * ea / (ea + tension))
+    rest = equilibrium(model, np.zeros(robot.n_cables), robot.weight, trial.q)
+    return replace(robot, model=model, rest=rest)
 
 
 def mismatched(

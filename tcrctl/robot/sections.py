@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import Discriminator, Field, Tag
 
-from tcrctl.config.settings import Settings, quantity
+from tcrctl.config.settings import Settings, Vector, quantity
 from tcrctl.robot.module import LABELS
+
+T = TypeVar("T")
 
 Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 NodeName: TypeAlias = Annotated[str, Field(pattern=rf"^(base|m[1-9][0-9]*)\.({'|'.join(LABELS)})$")]
@@ -20,8 +22,36 @@ Degrees: TypeAlias = Annotated[
 ]
 
 
+def _one_or_each(value: Any) -> str:
+    return "(each)" if isinstance(value, list | tuple) else "(one)"
+
+
+CablesOrOne = Annotated[
+    Annotated[T, Tag("(one)")] | Annotated[tuple[T, ...], Field(strict=False), Tag("(each)")],
+    Discriminator(_one_or_each),
+]
+"""One value for all cables, or a list with one for each."""
+
+
+class ModuleDifference(Settings):
+    """A module that is not like the others; what is left out is as in ``modules``."""
+
+    module: int = Field(description="number of the module, 1 is the first below the base", ge=1)
+    pitch_mm: float | None = quantity("mm", "distance of its ring plane from the one above", None, gt=0)
+    ring_diameter_mm: float | None = quantity("mm", "diameter of the ring", None, gt=0)
+    cone_height_mm: float | None = quantity("mm", "ring plane to apex", None, gt=0)
+    rod_diameter_mm: float | None = quantity("mm", "diameter of rods and ring sides", None, gt=0)
+    youngs_modulus_mpa: float | None = quantity("MPa", "Young's modulus of rods and ring sides", None, gt=0)
+    mass_g: float | None = quantity("g", "mass", None, gt=0)
+    ring_mass_fraction: float | None = quantity("1", "part of the mass on the ring", None, ge=0, lt=1)
+    damping_n_s_m: float | None = quantity("N s/m", "axial damping of rods and ring sides", None, ge=0)
+    offsets_mm: dict[Literal["n1", "n2", "n3", "apex"], Vector] = quantity(
+        "mm", "where its nodes are in the straight robot, beside the place of an ideal module", {}
+    )
+
+
 class ModuleSettings(Settings):
-    """The modules, all alike: a ring and an apex joined by three rods; the fixed base is one more."""
+    """The modules: a ring and an apex joined by three rods; the fixed base is one more."""
 
     count: int = Field(description="number of moving modules", ge=1, le=200)
     pitch_mm: float = quantity("mm", "distance between neighbouring ring planes", gt=0)
@@ -34,6 +64,18 @@ class ModuleSettings(Settings):
         "1", "part of the mass on the ring; the rest is on the rods", 0.5, ge=0, lt=1
     )
     damping_n_s_m: float = quantity("N s/m", "axial damping of rods and ring sides", 0.0, ge=0)
+    each: tuple[ModuleDifference, ...] = Field(default=(), description="modules that are not like the others")
+
+    def of(self, module: int) -> ModuleSettings:
+        """Return the settings of one module, 0 for the base."""
+        own = next((entry for entry in self.each if entry.module == module), None)
+        if own is None:
+            return self
+        return self.model_copy(update=own.model_dump(exclude_none=True, exclude={"module", "offsets_mm"}))
+
+    def offsets(self) -> dict[tuple[int, str], Vector]:
+        """Return the offset of every node that has one, by module and label [mm]."""
+        return {(e.module, label): offset for e in self.each for label, offset in e.offsets_mm.items()}
 
 
 class SpringBetween(Settings):
@@ -75,6 +117,24 @@ class SpringSettings(Settings):
     between: tuple[Between, ...] = Field(
         default=(), description="further springs between any two named nodes"
     )
+    each: tuple[SpringBetween, ...] = Field(
+        default=(), description="springs that are not like the others, by the nodes that they join"
+    )
+
+    def entries(self, modules: int) -> list[SpringBetween]:
+        """Return all springs of a robot of so many modules: joints from the base down, then the further ones."""
+        joints = [
+            SpringBetween(nodes=(_joint_node(a, upper), _joint_node(b, upper)))
+            for upper in range(modules)
+            for a, b in self.joint
+        ]
+        return joints + [e if isinstance(e, SpringBetween) else SpringBetween(nodes=e) for e in self.between]
+
+
+def _joint_node(name: str, upper: int) -> str:
+    side, node = name.split(".")
+    module = upper if side == "upper" else upper + 1
+    return f"m{module}.{node}" if module else f"base.{node}"
 
 
 class Hole(Settings):
@@ -136,6 +196,22 @@ class CableSettings(Settings):
     )
 
 
+class FrictionSettings(Settings):
+    """Friction of the cables in their holes: capstan law, see docs/reality.md."""
+
+    coefficient: CablesOrOne[Annotated[float, Field(ge=0.0, le=3.0)]] = quantity(
+        "1", "coefficient of Coulomb friction in the holes, common or per cable", 0.1
+    )
+    least_wrap_deg: float = quantity("deg", "least angle by which a cable wraps a hole", 2.0, ge=0, le=90)
+    drag_n: float = quantity("N", "friction of a hole whatever the tension", 0.0, ge=0)
+
+
+class BaseSettings(Settings):
+    """How the fixed base hangs."""
+
+    tilt_deg: tuple[float, float] = quantity("deg", "turn of the base about the x and the y axis", (0.0, 0.0))
+
+
 class Tip(Settings):
     """The ring that is the end effector."""
 
@@ -143,4 +219,3 @@ class Tip(Settings):
 
 
 Stroke: TypeAlias = tuple[float, float]
-Vector: TypeAlias = tuple[float, float, float]

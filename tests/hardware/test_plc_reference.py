@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from support.structured_text import FunctionBlock
 from tcr_hardware.emulators.plc_program import PlcCommand, PlcLimitSettings, PlcProgram
-from tcr_hardware.emulators.servo import ServoSettings
+from tcr_hardware.servo import ServoSettings
 from tcr_hardware.modbus.document import register_map_markdown
 from tcr_hardware.modbus.registers import Control, Fault, Reject, Status, register_map
 

@@ -21,7 +21,7 @@ from tcr_hardware.emulators.modbus_tcp import TcpPort
 from tcr_hardware.emulators.plc_faults import PlcFaults
 from tcr_hardware.emulators.plc_image import PlcImage, Values, identity
 from tcr_hardware.emulators.plc_program import PlcLimitSettings, PlcProgram, command_of
-from tcr_hardware.emulators.servo import ServoSettings
+from tcr_hardware.servo import ServoSettings
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.modbus.registers import RegisterMap, Status, register_map
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tcr_hardware.emulators.servo import Servo, ServoSettings
+from tcr_hardware.servo import Servo, ServoSettings
 from tcr_hardware.modbus.registers import Control, Fault, Reject, Status
 
 #: Set-points are spread over the time between the last two sets, within these bounds [s].

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tcr_hardware.emulators.plc_program import PlcCommand, PlcLimitSettings, PlcProgram
-from tcr_hardware.emulators.servo import Servo, ServoSettings
+from tcr_hardware.servo import Servo, ServoSettings
 from tcr_hardware.modbus.registers import Control, Fault, Reject, Status
 
 DT = 0.002

@@ -1,0 +1,39 @@
+"""Creep of cables: standard linear solid, elongation that comes late.
+
+Beside its elastic elongation T / k a cable has one more per branch, u_i, which follows its tension with a delay:
+
+    τ_i du_i/dt = r_i T / k - u_i
+
+In rest it has already come, so that the robot starts where its rest lengths say; only changes count. It is a change of
+unstretched lengths between internal steps, exact for a tension that is constant during the step. [F80]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tcrctl.plant.reality_settings import CreepBranch
+from tcrctl.signals import Array
+
+
+class Creep:
+    """Late elongations of all cables, or of all their stretches.
+
+    Attributes:
+        late: Elongation of every branch (n_branches, n) [m].
+    """
+
+    def __init__(self, branches: Sequence[CreepBranch], elastic: Array) -> None:
+        """Be at rest with elastic elongations T / k (n,) [m]."""
+        self._strength = np.array([branch.strength for branch in branches])
+        self._time = np.array([branch.time_s for branch in branches])
+        self.late = np.outer(self._strength, elastic)
+
+    def step(self, elastic: Array, h: float) -> Array:
+        """Return by how much the unstretched lengths grow (n,) [m] during ``h`` [s] under elongations T / k (n,) [m]."""
+        share = -np.expm1(-h / self._time)
+        grown = share[:, None] * (np.outer(self._strength, elastic) - self.late)
+        self.late += grown
+        return np.asarray(grown.sum(axis=0))

@@ -1,0 +1,74 @@
+"""Drives of the simulated plant: what the controller asks for, what the cables get, what is reported.
+
+Between two internal steps a set-point is a straight line. A position loop of time constant τ that follows
+s(t) = s_0 + v t from x_0 is after h at x = x_0 + (1 - e^(-h/τ)) (S - x_0) with S = s_0 + v (h / (1 - e^(-h/τ)) - τ): the
+same as if it had followed the constant S with the lag h / (1 - e^(-h/τ)) of a loop that is sampled once per h. So the
+lag of a drive does not depend on the step.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tcr_hardware.servo import Servo, ServoSettings, in_counts
+from tcrctl.plant.reality_settings import DriveSettings
+from tcrctl.signals import Array
+
+#: Micrometres per metre.
+UM = 1e6
+
+
+class SimulatedDrives:
+    """One servo per cable.
+
+    Attributes:
+        set_point: Where the drives shall be (m,) [m].
+    """
+
+    def __init__(self, settings: DriveSettings, start: Array, step: float) -> None:
+        """Rest at drive lengths ``start`` (m,) [m], to be moved in steps of ``step`` [s]."""
+        self._settings = settings
+        lag, keep = settings.lag_s, math.exp(-step / settings.lag_s) if settings.lag_s > 0.0 else 0.0
+        sampled = step / (1.0 - keep)
+        self._step, self._ahead = step, sampled - lag
+        radius = np.broadcast_to(settings.radius_error, start.shape)
+        zero = np.broadcast_to(settings.zero_error_mm, start.shape)
+        limit = settings.acceleration_limit_mm_s2
+        self._servos = [
+            Servo(
+                ServoSettings(
+                    lag_s=sampled,
+                    speed_um_s=math.inf,
+                    acceleration_um_s2=math.inf if limit is None else 1e3 * limit,
+                    backlash_um=1e3 * settings.backlash_mm,
+                    dead_time_s=settings.dead_time_s,
+                    count_um=1e3 * settings.quantisation_mm,
+                    radius_error=float(radius[c]),
+                    zero_error_um=1e3 * float(zero[c]),
+                ),
+                UM * float(start[c]),
+            )
+            for c in range(start.size)
+        ]
+        self.set_point = start.copy()
+
+    def cable(self) -> Array:
+        """Return the cable that is really taken in (m,) [m]."""
+        return np.array([servo.output for servo in self._servos]) / UM
+
+    def reported(self) -> Array:
+        """Return what the drives report (m,) [m]."""
+        if self._settings.reports == "set_point":
+            return self.set_point.copy()
+        count = 1e3 * self._settings.quantisation_mm
+        return np.array([in_counts(servo.position, count) for servo in self._servos]) / UM
+
+    def move(self, speed: Array) -> Array:
+        """Let the set-points move at ``speed`` (m,) [m/s] for one step; return the cable taken in then (m,) [m]."""
+        followed = self.set_point + speed * self._ahead
+        self.set_point = self.set_point + speed * self._step
+        for servo, target in zip(self._servos, (UM * followed).tolist(), strict=True):
+            servo.step(target, self._step)
+        return self.cable()
