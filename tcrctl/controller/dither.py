@@ -67,6 +67,7 @@ class Dither:
         self._signs, self._step = signs(robot), 0
         self._place = np.zeros(robot.n_cables)
         self._expected: Array | None = None
+        self._errors = np.zeros((2 * self._half_wave, 3))
         self._blend = -float(np.expm1(-period / settings.filter_s))
 
     def memory(self) -> Mapping[str, Kept]:
@@ -78,7 +79,8 @@ class Dither:
         s = self._settings
         if s is None or self._expected is None:
             return
-        size = float(np.linalg.norm(position - self._expected))
+        self._errors[self._step % self._errors.shape[0]] = position - self._expected
+        size = float(np.linalg.norm(np.mean(self._errors, axis=0)))  # over a whole wave: without its own trace
         self.innovation += self._blend * (min(size, s.outlier_mm / 1e3) - self.innovation)
         excess = self.innovation - s.threshold_mm / 1e3
         rate = s.growth_1_s * excess if excess > 0.0 else -self.amplitude / s.release_s
