@@ -6,8 +6,10 @@ import ast
 import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -31,6 +33,12 @@ def test_the_code_passes_its_static_checks(name):
         [sys.executable, *CHECKS[name]], cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_no_imports_go_round_in_a_circle():
+    graph = grimp.build_graph("tcrctl", "tcr_hardware")
+    arrows = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    TopologicalSorter(arrows).prepare()  # raises CycleError, which names the circle
 
 
 def test_no_file_is_too_long():

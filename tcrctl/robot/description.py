@@ -16,10 +16,10 @@ from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding
 from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.robot import checks
+from tcrctl.robot.module import ModuleSettings
 from tcrctl.robot.sections import (
     CableSettings,
     FreeRoute,
-    ModuleSettings,
     Name,
     Route,
     SpringBetween,

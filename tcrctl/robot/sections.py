@@ -20,22 +20,6 @@ Degrees: TypeAlias = Annotated[
 ]
 
 
-class ModuleSettings(Settings):
-    """The modules, all alike: a ring and an apex joined by three rods; the fixed base is one more."""
-
-    count: int = Field(description="number of moving modules", ge=1, le=200)
-    pitch_mm: float = quantity("mm", "distance between neighbouring ring planes", gt=0)
-    ring_diameter_mm: float = quantity("mm", "diameter of the ring through its three nodes", gt=0)
-    cone_height_mm: float = quantity("mm", "ring plane to apex", gt=0)
-    rod_diameter_mm: float = quantity("mm", "diameter of rods and ring sides", gt=0)
-    youngs_modulus_mpa: float = quantity("MPa", "Young's modulus of rods and ring sides", gt=0)
-    mass_g: float = quantity("g", "mass of one module", gt=0)
-    ring_mass_fraction: float = quantity(
-        "1", "part of the mass on the ring; the rest is on the rods", 0.5, ge=0, lt=1
-    )
-    damping_n_s_m: float = quantity("N s/m", "axial damping of rods and ring sides", 0.0, ge=0)
-
-
 class SpringBetween(Settings):
     """A further spring; what is left out is as in ``springs``."""
 
