@@ -25,7 +25,7 @@ KEPT_S = 7 * 86400.0
 
 #: The first example may compile kernels, so no deadline; the same examples every time.
 hypothesis.settings.register_profile("tcrctl", deadline=None, derandomize=True, print_blob=True)
-hypothesis.settings.load_profile("tcrctl")
+hypothesis.settings.register_profile("fast", hypothesis.settings.get_profile("tcrctl"), max_examples=20)
 
 
 def kernel_key() -> str:
@@ -40,6 +40,7 @@ def kernel_key() -> str:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Before numba is imported: one folder of compiled kernels per state of the sources, for all workers."""
+    hypothesis.settings.load_profile("fast" if config.option.markexpr == "fast" else "tcrctl")
     if "PYTEST_XDIST_WORKER" in os.environ or getattr(config, "cache", None) is None:
         return  # workers inherit the folder
     os.environ.setdefault("NUMBA_OPT", "1")  # as the command line does
@@ -48,6 +49,12 @@ def pytest_configure(config: pytest.Config) -> None:
         if time.time() - folder.stat().st_mtime > KEPT_S:
             shutil.rmtree(folder, ignore_errors=True)
     os.environ["NUMBA_CACHE_DIR"] = str(folders / kernel_key())
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """What is not marked slow is fast."""
+    if item.get_closest_marker("slow") is None:
+        item.add_marker("fast")
 
 
 def shipped(name: str) -> Robot:

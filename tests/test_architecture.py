@@ -27,6 +27,7 @@ CHECKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHECKS)
 def test_the_code_passes_its_static_checks(name):
     done = subprocess.run(
@@ -54,6 +55,7 @@ def length(function):
     return function.end_lineno - function.lineno + 1 - documented * (first.end_lineno - first.lineno + 1)
 
 
+@pytest.mark.slow
 def test_no_function_is_too_long():
     too_long = {
         f"{path.relative_to(ROOT)}:{node.lineno} {node.name}": length(node)

@@ -22,6 +22,8 @@ from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.spec import load_spec
 from tcrctl.log.reader import read_log
 
+pytestmark = pytest.mark.slow
+
 #: A test computer is busy; the figure of a real bench is tried in the fault matrix.
 WATCHDOG_MS = 1500
 PATIENT = "safety: {stale_after_ms: 1000, stale_stop_ms: 4000, silence_stop_ms: 4000, following_mm: 20}"
