@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 import subprocess
@@ -13,12 +12,13 @@ from typing import TYPE_CHECKING
 import hypothesis
 import pytest
 
+from tcrctl.cli.kernel_cache import kernel_key
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tcrctl.robot.robot import Robot
 
-ROOT = Path(__file__).parents[1]
 #: Compiled kernels of former states of the sources are removed after a week.
 KEPT_S = 7 * 86400.0
 
@@ -26,16 +26,6 @@ KEPT_S = 7 * 86400.0
 #: The first example may compile kernels, so no deadline; the same examples every time.
 hypothesis.settings.register_profile("tcrctl", deadline=None, derandomize=True, print_blob=True)
 hypothesis.settings.register_profile("fast", hypothesis.settings.get_profile("tcrctl"), max_examples=20)
-
-
-def kernel_key() -> str:
-    """Hash of all sources with kernels: numba itself does not notice edits in files that a kernel imports."""
-    digest = hashlib.sha256()
-    for path in sorted((ROOT / "tcrctl").rglob("*.py")):
-        source = path.read_bytes()
-        if b"numba" in source:
-            digest.update(str(path.relative_to(ROOT)).encode() + b"\0" + source + b"\0")
-    return digest.hexdigest()[:16]
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -119,7 +119,7 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
     """
     changes: dict[str, Any] = {} if seed is None else {"seed": seed}
     spec = loaded.spec.model_copy(update=changes)
-    with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
+    with announced_compilation(notify):
         robot = build_robot(loaded.robot)
         trajectory = make_trajectory(spec, robot)
         if spec.controller.tracks == "pose" and trajectory.normal(np.zeros(1)) is None:
