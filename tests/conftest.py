@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 import subprocess
@@ -13,33 +12,25 @@ from typing import TYPE_CHECKING
 import hypothesis
 import pytest
 
+from tcrctl.cli.kernel_cache import kernel_key
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tcrctl.robot.robot import Robot
 
-ROOT = Path(__file__).parents[1]
 #: Compiled kernels of former states of the sources are removed after a week.
 KEPT_S = 7 * 86400.0
 
 
 #: The first example may compile kernels, so no deadline; the same examples every time.
 hypothesis.settings.register_profile("tcrctl", deadline=None, derandomize=True, print_blob=True)
-hypothesis.settings.load_profile("tcrctl")
-
-
-def kernel_key() -> str:
-    """Hash of all sources with kernels: numba itself does not notice edits in files that a kernel imports."""
-    digest = hashlib.sha256()
-    for path in sorted((ROOT / "tcrctl").rglob("*.py")):
-        source = path.read_bytes()
-        if b"numba" in source:
-            digest.update(str(path.relative_to(ROOT)).encode() + b"\0" + source + b"\0")
-    return digest.hexdigest()[:16]
+hypothesis.settings.register_profile("fast", hypothesis.settings.get_profile("tcrctl"), max_examples=20)
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Before numba is imported: one folder of compiled kernels per state of the sources, for all workers."""
+    hypothesis.settings.load_profile("fast" if config.option.markexpr == "fast" else "tcrctl")
     if "PYTEST_XDIST_WORKER" in os.environ or getattr(config, "cache", None) is None:
         return  # workers inherit the folder
     os.environ.setdefault("NUMBA_OPT", "1")  # as the command line does
@@ -48,6 +39,12 @@ def pytest_configure(config: pytest.Config) -> None:
         if time.time() - folder.stat().st_mtime > KEPT_S:
             shutil.rmtree(folder, ignore_errors=True)
     os.environ["NUMBA_CACHE_DIR"] = str(folders / kernel_key())
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """What is not marked slow is fast."""
+    if item.get_closest_marker("slow") is None:
+        item.add_marker("fast")
 
 
 def shipped(name: str) -> Robot:

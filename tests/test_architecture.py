@@ -6,8 +6,10 @@ import ast
 import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -25,12 +27,19 @@ CHECKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHECKS)
 def test_the_code_passes_its_static_checks(name):
     done = subprocess.run(
         [sys.executable, *CHECKS[name]], cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_no_imports_go_round_in_a_circle():
+    graph = grimp.build_graph("tcrctl", "tcr_hardware")
+    arrows = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    TopologicalSorter(arrows).prepare()  # raises CycleError, which names the circle
 
 
 def test_no_file_is_too_long():
@@ -46,6 +55,7 @@ def length(function):
     return function.end_lineno - function.lineno + 1 - documented * (first.end_lineno - first.lineno + 1)
 
 
+@pytest.mark.slow
 def test_no_function_is_too_long():
     too_long = {
         f"{path.relative_to(ROOT)}:{node.lineno} {node.name}": length(node)

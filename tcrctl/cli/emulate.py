@@ -86,7 +86,7 @@ def _built(
     settings = EmulationSettings(rate=rate_hz, watchdog_ms=watchdog_ms)
     if perfect:
         settings = replace(settings, mismatch=None, noise=1e-9)
-    with announced_compilation(lambda: _say("compiling numerical kernels (first run only) ...")):
+    with announced_compilation(_say):
         return EmulatedBench(file, settings), script
 
 

@@ -84,7 +84,7 @@ def replay(
     if plot is not None:
         check_format(plot)
         drawing = WhatIf()
-    with announced_compilation(_announce_compilation), progress_bar("replay") as progress:
+    with announced_compilation(_say), progress_bar("replay") as progress:
         found = run_replay(
             log,
             overrides=overrides or (),
@@ -105,8 +105,8 @@ def replay(
         raise typer.Exit(found.exit_code)
 
 
-def _announce_compilation() -> None:
-    print("compiling numerical kernels (first run only) ...", file=sys.stderr, flush=True)
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _announce(changes: Sequence[Change]) -> None:

@@ -8,13 +8,12 @@ from typing import Annotated, Any, ClassVar, Self, TypeAlias, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
-from tcrctl.config.keys import Finding, Keys, dotted
+from tcrctl.config.keys import Finding, dotted
 
 T = TypeVar("T")
 NotNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
 Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
 Vector: TypeAlias = tuple[float, float, float]
-Path: TypeAlias = Keys
 
 
 class Settings(BaseModel):

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol
 
-from tcrctl.config.settings import Settings
 from tcrctl.controller.instantaneous import InstantaneousOptimalControl
 from tcrctl.controller.kinematic import Kinematic
 from tcrctl.controller.literal import LiteralIoc
 from tcrctl.controller.open_loop import OpenLoop
 from tcrctl.controller.plan import Planner
-from tcrctl.controller.settings import ControllerSettings, IocSettings, KinematicSettings, OpenLoopSettings
+from tcrctl.controller.settings import (
+    ControllerSection,
+    ControllerSettings,
+    IocSettings,
+    KinematicSettings,
+    OpenLoopSettings,
+)
 from tcrctl.controller.shell import Shell
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
@@ -46,7 +51,7 @@ PLANNERS: Final[Mapping[str, Callable[[IocSettings, Robot], Planner]]] = {
     "literal": LiteralIoc,
 }
 #: Settings and builder of every ``controller.kind``.
-KINDS: Final[Mapping[str, tuple[type[Settings], Callable[[Any, Robot], Controller]]]] = {
+KINDS: Final[Mapping[str, tuple[type[ControllerSection], Callable[[Any, Robot], Controller]]]] = {
     "ioc": (IocSettings, _ioc),
     "kinematic": (KinematicSettings, _kinematic),
     "open_loop": (OpenLoopSettings, OpenLoop),

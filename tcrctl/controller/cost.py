@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tcrctl.controller.ioc import Weights
-from tcrctl.controller.settings import IocSettings, KinematicSettings
+from tcrctl.controller.settings import IocSettings, KinematicSettings, speed_limit
 from tcrctl.robot import pose
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
@@ -53,7 +53,7 @@ def input_limits(
     settings: IocSettings | KinematicSettings, robot: Robot, drive: Array, blocks: int
 ) -> tuple[Array, Array]:
     """Hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
-    limit = settings.speed_limit_mm_s / 1000.0
+    limit = speed_limit(settings)
     low, high = np.full(blocks * drive.shape[0], -limit), np.full(blocks * drive.shape[0], limit)
     m = drive.shape[0]
     # a drive outside its stroke may still move back: limits never cross

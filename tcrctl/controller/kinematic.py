@@ -16,7 +16,7 @@ import numpy as np
 
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.plan import Plan, Situation
-from tcrctl.controller.settings import KinematicSettings, SlackGuard
+from tcrctl.controller.settings import KinematicSettings, SlackGuard, speed_limit
 from tcrctl.memory import Kept
 from tcrctl.robot.equations import make_workspace
 from tcrctl.robot.equilibrium import static_load
@@ -128,5 +128,5 @@ class Kinematic:
     def _shortened(self, speed: Array) -> Array:
         """Return the speeds shortened to the speed limit, which keeps their direction."""
         fastest = float(np.max(np.abs(speed)))
-        limit = self._settings.speed_limit_mm_s / 1000.0
+        limit = speed_limit(self._settings)
         return speed * min(1.0, limit / fastest) if fastest > 0.0 else speed

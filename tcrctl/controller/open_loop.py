@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tcrctl.controller.settings import OpenLoopSettings
+from tcrctl.controller.settings import OpenLoopSettings, speed_limit
 from tcrctl.errors import InputError
 from tcrctl.memory import Kept
 from tcrctl.robot.robot import Robot
@@ -23,7 +23,7 @@ class OpenLoop:
     ahead: Array
 
     def __init__(self, settings: OpenLoopSettings, robot: Robot) -> None:
-        self._period, self._limit = settings.period_s, settings.speed_limit_mm_s / 1000.0
+        self._period, self._limit = settings.period_s, speed_limit(settings)
         self._stroke = robot.stroke
         self.ahead = np.array([settings.period_s])
 

@@ -7,7 +7,8 @@ from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
-from tcrctl.config.settings import OrOff, Path, Settings, ShortKind, quantity, refuse
+from tcrctl.config.keys import Finding
+from tcrctl.config.settings import OrOff, Settings, ShortKind, quantity, refuse
 
 #: Modes of a response, if the file does not say.
 MODES: Final = 8
@@ -43,7 +44,7 @@ class TensionSettings(Settings):
         refuse(self._disorder())
         return self
 
-    def _disorder(self) -> Iterator[tuple[Path, str]]:
+    def _disorder(self) -> Iterator[Finding]:
         if self.floor_n >= self.reference_n:
             yield ("floor_n",), f"must be below reference_n, {self.reference_n:g}, not {self.floor_n:g}"
         if self.ceiling_n <= self.reference_n:
@@ -110,7 +111,7 @@ class MultiStepSettings(Settings):
         """Time constant of the offset [s]; None if it is off."""
         return None if self.offset is None else self.offset.filter_s
 
-    def misfits(self, period_s: float, model: str) -> Iterator[tuple[Path, str]]:
+    def misfits(self, period_s: float, model: str) -> Iterator[Finding]:
         """Yield path and message of what does not go with a control period [s] and a model."""
         yield from _too_short(self.horizon_s, period_s)
         if model == "static" and self.modes != MODES:
@@ -121,7 +122,7 @@ class MultiStepSettings(Settings):
         refuse(self._disagreements())
         return self
 
-    def _disagreements(self) -> Iterator[tuple[Path, str]]:
+    def _disagreements(self) -> Iterator[Finding]:
         if self.horizon_s / self.instants > LONGEST_SPACING:
             yield ("instants",), f"must be so many that instants lie at most {LONGEST_SPACING:g} s apart"
         if self.blocks > self.instants:
@@ -134,7 +135,7 @@ class OneStepSettings(Settings):
     kind: Literal["one_step"]
     horizon_s: float = quantity("s", "prediction horizon, at least one control period", 0.8, gt=0, le=60)
 
-    def misfits(self, period_s: float, model: str) -> Iterator[tuple[Path, str]]:
+    def misfits(self, period_s: float, model: str) -> Iterator[Finding]:
         """Yield path and message of what does not go with a control period [s] and a model."""
         yield from _too_short(self.horizon_s, period_s)
         if model == "static":
@@ -149,13 +150,13 @@ class LiteralSettings(Settings):
 
     kind: Literal["literal"]
 
-    def misfits(self, period_s: float, model: str) -> Iterator[tuple[Path, str]]:
+    def misfits(self, period_s: float, model: str) -> Iterator[Finding]:
         """Yield nothing: it has no horizon but the control period, and goes with both models."""
         del period_s, model
         yield from ()
 
 
-def _too_short(horizon_s: float, period_s: float) -> Iterator[tuple[Path, str]]:
+def _too_short(horizon_s: float, period_s: float) -> Iterator[Finding]:
     if horizon_s < period_s:
         yield ("horizon_s",), f"must be at least period_s, {period_s:g}, not {horizon_s:g}"
 
@@ -168,7 +169,29 @@ Prediction: TypeAlias = Annotated[
 """Union of all kinds of prediction; the bare name of a kind stands for that kind with its defaults."""
 
 
-class IocSettings(Settings):
+class ControllerSection(Settings):
+    """What every ``controller:`` section can be asked, whatever its kind."""
+
+    #: Whether it moves the drives to lengths that the trajectory gives.
+    follows_drives: ClassVar[bool] = False
+
+    @property
+    def tracks(self) -> Literal["position", "pose"] | None:
+        """What of the end is fed back; None if nothing is."""
+        return None
+
+    @property
+    def floor_n(self) -> float | None:
+        """Lowest tension wanted [N]; None if none is."""
+        return None
+
+    @property
+    def ceiling_n(self) -> float | None:
+        """Highest tension wanted [N]; None if none is."""
+        return None
+
+
+class IocSettings(ControllerSection):
     """Instantaneous optimal control (30)-(41) with a prediction horizon of its own."""
 
     moved: ClassVar[Mapping[str, str]] = dict.fromkeys(
@@ -204,7 +227,7 @@ class IocSettings(Settings):
         refuse(self._disagreements())
         return self
 
-    def _disagreements(self) -> Iterator[tuple[Path, str]]:
+    def _disagreements(self) -> Iterator[Finding]:
         for path, what in self.prediction.misfits(self.period_s, self.model):
             yield ("prediction", *path), what
         if self.output == "position":
@@ -214,6 +237,21 @@ class IocSettings(Settings):
         elif self.weights.normal == 0:
             yield ("weights", "normal"), "must be > 0 with output: pose, or the normal is not tracked"
 
+    @property
+    def tracks(self) -> Literal["position", "pose"]:
+        """What of the end is fed back."""
+        return self.output
+
+    @property
+    def floor_n(self) -> float | None:
+        """Lowest tension wanted [N]."""
+        return None if self.tension is None else self.tension.floor_n
+
+    @property
+    def ceiling_n(self) -> float | None:
+        """Highest tension wanted [N]."""
+        return None if self.tension is None else self.tension.ceiling_n
+
 
 class SlackGuard(Settings):
     """Moves that leave the end where it is, by the model, bring the tensions towards a reference."""
@@ -222,7 +260,7 @@ class SlackGuard(Settings):
     gain_1_s: float = quantity("1/s", "part of the difference that is removed per second", 0.5, gt=0)
 
 
-class KinematicSettings(Settings):
+class KinematicSettings(ControllerSection):
     """Baseline for comparisons: resolved rates with the damped pseudo-inverse of the static map."""
 
     kind: Literal["kinematic"]
@@ -239,9 +277,16 @@ class KinematicSettings(Settings):
     )
     speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
 
+    @property
+    def tracks(self) -> Literal["position", "pose"]:
+        """What of the end is fed back."""
+        return self.output
 
-class OpenLoopSettings(Settings):
+
+class OpenLoopSettings(ControllerSection):
     """Moves the drives to the lengths that the trajectory gives; nothing is fed back."""
+
+    follows_drives: ClassVar[bool] = True
 
     kind: Literal["open_loop"]
     period_s: float = quantity("s", "control period", 0.05, gt=0, le=10)
@@ -252,3 +297,8 @@ ControllerSettings: TypeAlias = Annotated[
     IocSettings | KinematicSettings | OpenLoopSettings, Field(discriminator="kind")
 ]
 """Union of all kinds of controller, told apart by ``kind``."""
+
+
+def speed_limit(settings: ControllerSettings) -> float:
+    """Return the hard limit of every drive speed [m/s]."""
+    return settings.speed_limit_mm_s / 1000.0

@@ -15,7 +15,7 @@ from tcrctl.controller.dither import Dither
 from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.plan import Planner, Situation
-from tcrctl.controller.settings import IocSettings, KinematicSettings
+from tcrctl.controller.settings import IocSettings, KinematicSettings, speed_limit
 from tcrctl.memory import SPEED, Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
@@ -50,7 +50,7 @@ class Shell:
         self._speed = np.zeros(self._robot.n_cables) if reason else at.within(plan.speed)
         self.dither.expect(None if reason else plan.expected)
         speed = self._speed if reason else at.within(self._speed + self.dither.speed())
-        limit = self._settings.speed_limit_mm_s / 1000.0
+        limit = speed_limit(self._settings)
         self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
         info = ControlInfo(
             converged=not reason,

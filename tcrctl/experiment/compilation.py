@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 
 @contextmanager
-def announced_compilation(announce: Callable[[], None]) -> Iterator[None]:
-    """Call ``announce`` once, when the first kernel is compiled in the ``with`` body; never if all are cached.
+def announced_compilation(say: Callable[[str], None]) -> Iterator[None]:
+    """Say so once, when the first kernel is compiled in the ``with`` body; nothing if all are cached.
 
     Args:
-        announce: Is called in the middle of the work, so it should only print.
+        say: Takes the sentence; is called in the middle of the work, so it should only print.
     """
     from numba.core import event  # heavy
 
@@ -23,10 +24,15 @@ def announced_compilation(announce: Callable[[], None]) -> Iterator[None]:
             del event
             if not self.done:
                 self.done = True
-                announce()
+                say(_sentence())
 
         def on_end(self, event: Any) -> None:
             del event
 
     with event.install_listener("numba:compile", _First()):
         yield
+
+
+def _sentence() -> str:
+    kept = os.environ.get("NUMBA_CACHE_DIR")
+    return "compiling numerical kernels (first run only) ..." + (f" kept in {kept}" if kept else "")

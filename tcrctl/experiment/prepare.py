@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from tcrctl.controller.controller import build_controller
-from tcrctl.controller.settings import IocSettings, OpenLoopSettings
+from tcrctl.controller.settings import speed_limit
 from tcrctl.errors import InputError, StoppedError
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.exact import State
@@ -121,11 +121,10 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
         NoEquilibriumError: If the robot has no stable shape.
     """
     spec = with_draws(loaded.spec, len(loaded.robot.cables.routes), seed)
-    with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
+    with announced_compilation(notify):
         robot = build_robot(loaded.robot)
         trajectory = make_trajectory(spec, robot)
-        tracks = None if isinstance(spec.controller, OpenLoopSettings) else spec.controller.output
-        if tracks == "pose" and trajectory.normal(np.zeros(1)) is None:
+        if spec.controller.tracks == "pose" and trajectory.normal(np.zeros(1)) is None:
             raise InputError(
                 f"{loaded.path}: controller.output: pose needs a trajectory with an orientation; "
                 f"trajectory.kind: {spec.trajectory.kind} leaves it free"
@@ -152,13 +151,13 @@ def plan(experiment: Experiment) -> StaticPath:
         InfeasibleError: If the robot cannot follow.
     """
     robot, controller = experiment.robot, experiment.spec.controller
-    tension = controller.tension if isinstance(controller, IocSettings) else None
+    floor, ceiling = controller.floor_n, controller.ceiling_n
     limits = DriveLimits(
-        speed=controller.speed_limit_mm_s * 1e-3,
-        floor=0.0 if tension is None else tension.floor_n,
-        ceiling=robot.tension_limit if tension is None else tension.ceiling_n,
+        speed=speed_limit(controller),
+        floor=0.0 if floor is None else floor,
+        ceiling=robot.tension_limit if ceiling is None else ceiling,
     )
-    if isinstance(controller, OpenLoopSettings):
+    if controller.follows_drives:
         return check_drives(experiment.trajectory, robot, limits)
     return check_feasibility(experiment.trajectory, robot, limits)
 

@@ -17,7 +17,7 @@ from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding
 from tcrctl.config.kind_switch import without_former_keys
 from tcrctl.config.settings import Settings, quantity, refuse
-from tcrctl.controller.settings import ControllerSettings, IocSettings
+from tcrctl.controller.settings import ControllerSettings
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
 from tcrctl.experiment.criterion import CriterionText
@@ -120,11 +120,9 @@ def _disagreements(spec: ExperimentSpec) -> Iterator[Finding]:
             known = ", ".join(difflib.get_close_matches(criterion.name, results, n=3, cutoff=0.3) or results)
             yield ("criteria", i), f"a run has no result {criterion.name}; known: {known}"
     yield from _target_disagreements(spec)
-    if spec.controller.kind == "open_loop" and spec.trajectory.kind != "drives":
-        yield (
-            ("trajectory", "kind"),
-            f"must be drives with controller.kind: open_loop, not {spec.trajectory.kind}",
-        )
+    if spec.controller.follows_drives and not spec.trajectory.gives_drives:
+        need = f"must be drives with controller.kind: {spec.controller.kind}"
+        yield ("trajectory", "kind"), f"{need}, not {spec.trajectory.kind}"
     for keys, message in spec.plant.misfits(spec.controller.period_s):
         yield ("plant", *keys), message
 
@@ -150,10 +148,10 @@ def misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[Finding]:
         if ring > count:
             yield ("plant", *keys), f"there is no ring {ring}; {robot.name} has rings 1 to {count}"
     yield from _drive_misfits(spec, robot)
-    tension = spec.controller.tension if isinstance(spec.controller, IocSettings) else None
-    if tension is not None and tension.ceiling_n > robot.tension_limit_n:
+    ceiling = spec.controller.ceiling_n
+    if ceiling is not None and ceiling > robot.tension_limit_n:
         limit = f"tension_limit_n of {robot.name}, {robot.tension_limit_n:g}"
-        yield ("controller", "tension", "ceiling_n"), f"must be at most {limit}, not {tension.ceiling_n:g}"
+        yield ("controller", "tension", "ceiling_n"), f"must be at most {limit}, not {ceiling:g}"
 
 
 def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[Finding]:

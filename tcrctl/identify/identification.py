@@ -100,7 +100,7 @@ def identify(
         LogError: If a log is damaged.
     """
     begin = time.perf_counter()
-    with announced_compilation(lambda: notify("compiling numerical kernels (first run only) ...")):
+    with announced_compilation(notify):
         problem, strung_by = build_problem(loaded)
         frame, predicted, remark = choose_frame(loaded, problem)
     best = Best.none(start_of(problem.parameters), frame)

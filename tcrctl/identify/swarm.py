@@ -1,6 +1,8 @@
-"""Particle swarm over the unit cube, the paper's method for (10); the swarm is pymoo's."""
+"""Particle swarm over the unit cube, the paper's method for (10)."""
 
 from __future__ import annotations
+
+from typing import Final
 
 import numpy as np
 
@@ -12,9 +14,17 @@ from tcrctl.identify.settings import SwarmSettings
 from tcrctl.signals import Array
 
 #: Cost of a particle for which the robot has no stable shape [mm].
-NO_SHAPE = 1e4
+NO_SHAPE: Final = 1e4
 #: Relative improvement that counts as one.
-IMPROVEMENT = 1e-3
+IMPROVEMENT: Final = 1e-3
+#: Share of its velocity that a particle keeps, and how strongly its own best place and the swarm's draw it.
+#: With the 0.73 of textbooks a swarm of 20 has not come to rest after 40 iterations.
+INERTIA: Final = 0.5
+PULL: Final = 1.5
+#: Greatest velocity in each coordinate, per iteration.
+FASTEST: Final = 0.2
+#: Share of its velocity with which a particle comes back from a bound.
+REBOUND: Final = 0.5
 
 
 def search(
@@ -30,26 +40,33 @@ def search(
         seed: Seed of its random numbers.
         best: Takes every improvement, so that an interrupted search loses nothing.
     """
-    from pymoo.algorithms.soo.nonconvex.pso import PSO
-    from pymoo.core.evaluator import Evaluator as Bookkeeper
-    from pymoo.core.population import Population
-    from pymoo.core.problem import Problem
-    from pymoo.problems.static import StaticProblem
-
-    n = len(start)
-    problem = Problem(n_var=n, n_obj=1, xl=np.zeros(n), xu=np.ones(n))
-    cube = np.random.default_rng(seed).random((settings.particles, n))
-    cube[0] = start
-    swarm = PSO(pop_size=settings.particles, sampling=Population.new("X", cube))
-    swarm.setup(problem, termination=("n_gen", settings.iterations), seed=seed, verbose=False)
-    stale, level = 0, np.inf
-    while swarm.has_next() and stale < settings.patience:
-        particles = swarm.ask()
-        costs = _costs(evaluator, frame, particles.get("X"), best)
-        Bookkeeper().eval(StaticProblem(problem, F=costs[:, None]), particles)
-        swarm.tell(infills=particles)
+    random = np.random.default_rng(seed)
+    shape = settings.particles, len(start)
+    place = random.random(shape)
+    place[0] = start
+    velocity = random.uniform(-FASTEST, FASTEST, shape)
+    own, own_cost = place.copy(), np.full(settings.particles, np.inf)
+    stale = 0
+    level = np.inf
+    for _ in range(settings.iterations):
+        cost = _costs(evaluator, frame, place, best)
+        better = cost < own_cost
+        own[better], own_cost[better] = place[better], cost[better]
         stale = 0 if best.cost < level * (1.0 - IMPROVEMENT) else stale + 1
+        if stale == settings.patience:
+            return
         level = min(level, best.cost) if stale else best.cost
+        velocity = INERTIA * velocity
+        for goal in (own, own[np.argmin(own_cost)]):
+            velocity += PULL * random.random(shape) * (goal - place)
+        place, velocity = _moved(place, np.clip(velocity, -FASTEST, FASTEST))
+
+
+def _moved(place: Array, velocity: Array) -> tuple[Array, Array]:
+    """Places one iteration later, and velocities; who would leave the cube stops at its face and turns round."""
+    ahead = place + velocity
+    outside = (ahead < 0.0) | (ahead > 1.0)
+    return np.clip(ahead, 0.0, 1.0), np.where(outside, -REBOUND * velocity, velocity)
 
 
 def _costs(evaluator: Evaluator, frame: Frame, particles: Array, best: Best) -> Array:

@@ -16,12 +16,12 @@ from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding
 from tcrctl.config.settings import OrOff, Settings, Vector, quantity, refuse
 from tcrctl.robot import checks
+from tcrctl.robot.module import ModuleSettings
 from tcrctl.robot.sections import (
     BaseSettings,
     CableSettings,
     FreeRoute,
     FrictionSettings,
-    ModuleSettings,
     Name,
     Route,
     SpringBetween,

@@ -1,23 +1,23 @@
 """The module of the robot, a cone: three nodes on a ring, an apex, and three rods between them.
 
-All that follows from it is here: how nodes are numbered and named, what is rigid, where the mass is. Everybody
-else asks for rings, apexes and rows. Kernels know the two sizes, ``NODES`` and ``SIZE``, and that the fixed base,
-module 0, comes first. Another kind of module, a disc on a backbone for instance, begins as another file like this.
+All that follows from it is here: its section of a robot file, how nodes are numbered and named, what is rigid,
+where the mass is. Everybody else asks for rings, apexes and rows. Kernels know the two sizes, ``NODES`` and
+``SIZE``, and that the fixed base, module 0, comes first. Another kind of module, a disc on a backbone for
+instance, begins as another file like this one.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import Final, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from tcrctl.config.settings import Settings, Vector, quantity
 from tcrctl.elements import torus
 from tcrctl.signals import Array
-
-if TYPE_CHECKING:
-    from tcrctl.robot.sections import ModuleSettings
 
 LABELS: Final = ("n1", "n2", "n3", "apex")
 #: Nodes of one module: first those of its ring, counter-clockwise seen from +z, then the apex.
@@ -32,6 +32,51 @@ FIXED: Final = NODES
 RIGID_BARS: Final = 6
 
 _Rows = TypeVar("_Rows", int, NDArray[np.int64])
+
+
+class ModuleDifference(Settings):
+    """A module that is not like the others; what is left out is as in ``modules``."""
+
+    module: int = Field(description="number of the module, 1 is the first below the base", ge=1)
+    pitch_mm: float | None = quantity("mm", "distance of its ring plane from the one above", None, gt=0)
+    ring_diameter_mm: float | None = quantity("mm", "diameter of the ring", None, gt=0)
+    cone_height_mm: float | None = quantity("mm", "ring plane to apex", None, gt=0)
+    rod_diameter_mm: float | None = quantity("mm", "diameter of rods and ring sides", None, gt=0)
+    youngs_modulus_mpa: float | None = quantity("MPa", "Young's modulus of rods and ring sides", None, gt=0)
+    mass_g: float | None = quantity("g", "mass", None, gt=0)
+    ring_mass_fraction: float | None = quantity("1", "part of the mass on the ring", None, ge=0, lt=1)
+    damping_n_s_m: float | None = quantity("N s/m", "axial damping of rods and ring sides", None, ge=0)
+    offsets_mm: dict[Literal["n1", "n2", "n3", "apex"], Vector] = quantity(
+        "mm", "where its nodes are in the straight robot, beside the place of an ideal module", {}
+    )
+
+
+class ModuleSettings(Settings):
+    """The modules: a ring and an apex joined by three rods; the fixed base is one more."""
+
+    count: int = Field(description="number of moving modules", ge=1, le=200)
+    pitch_mm: float = quantity("mm", "distance between neighbouring ring planes", gt=0)
+    ring_diameter_mm: float = quantity("mm", "diameter of the ring through its three nodes", gt=0)
+    cone_height_mm: float = quantity("mm", "ring plane to apex", gt=0)
+    rod_diameter_mm: float = quantity("mm", "diameter of rods and ring sides", gt=0)
+    youngs_modulus_mpa: float = quantity("MPa", "Young's modulus of rods and ring sides", gt=0)
+    mass_g: float = quantity("g", "mass of one module", gt=0)
+    ring_mass_fraction: float = quantity(
+        "1", "part of the mass on the ring; the rest is on the rods", 0.5, ge=0, lt=1
+    )
+    damping_n_s_m: float = quantity("N s/m", "axial damping of rods and ring sides", 0.0, ge=0)
+    each: tuple[ModuleDifference, ...] = Field(default=(), description="modules that are not like the others")
+
+    def of(self, module: int) -> ModuleSettings:
+        """Return the settings of one module, 0 for the base."""
+        own = next((entry for entry in self.each if entry.module == module), None)
+        if own is None:
+            return self
+        return self.model_copy(update=own.model_dump(exclude_none=True, exclude={"module", "offsets_mm"}))
+
+    def offsets(self) -> dict[tuple[int, str], Vector]:
+        """Return the offset of every node that has one, by module and label [mm]."""
+        return {(e.module, label): offset for e in self.each for label, offset in e.offsets_mm.items()}
 
 
 def node_count(n_modules: int) -> int:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 from pydantic import Discriminator, Field, Tag
 
-from tcrctl.config.settings import Settings, Vector, quantity
+from tcrctl.config.settings import Settings, quantity
 from tcrctl.robot.module import LABELS
 
 T = TypeVar("T")
@@ -31,51 +31,6 @@ CablesOrOne = Annotated[
     Discriminator(_one_or_each),
 ]
 """One value for all cables, or a list with one for each."""
-
-
-class ModuleDifference(Settings):
-    """A module that is not like the others; what is left out is as in ``modules``."""
-
-    module: int = Field(description="number of the module, 1 is the first below the base", ge=1)
-    pitch_mm: float | None = quantity("mm", "distance of its ring plane from the one above", None, gt=0)
-    ring_diameter_mm: float | None = quantity("mm", "diameter of the ring", None, gt=0)
-    cone_height_mm: float | None = quantity("mm", "ring plane to apex", None, gt=0)
-    rod_diameter_mm: float | None = quantity("mm", "diameter of rods and ring sides", None, gt=0)
-    youngs_modulus_mpa: float | None = quantity("MPa", "Young's modulus of rods and ring sides", None, gt=0)
-    mass_g: float | None = quantity("g", "mass", None, gt=0)
-    ring_mass_fraction: float | None = quantity("1", "part of the mass on the ring", None, ge=0, lt=1)
-    damping_n_s_m: float | None = quantity("N s/m", "axial damping of rods and ring sides", None, ge=0)
-    offsets_mm: dict[Literal["n1", "n2", "n3", "apex"], Vector] = quantity(
-        "mm", "where its nodes are in the straight robot, beside the place of an ideal module", {}
-    )
-
-
-class ModuleSettings(Settings):
-    """The modules: a ring and an apex joined by three rods; the fixed base is one more."""
-
-    count: int = Field(description="number of moving modules", ge=1, le=200)
-    pitch_mm: float = quantity("mm", "distance between neighbouring ring planes", gt=0)
-    ring_diameter_mm: float = quantity("mm", "diameter of the ring through its three nodes", gt=0)
-    cone_height_mm: float = quantity("mm", "ring plane to apex", gt=0)
-    rod_diameter_mm: float = quantity("mm", "diameter of rods and ring sides", gt=0)
-    youngs_modulus_mpa: float = quantity("MPa", "Young's modulus of rods and ring sides", gt=0)
-    mass_g: float = quantity("g", "mass of one module", gt=0)
-    ring_mass_fraction: float = quantity(
-        "1", "part of the mass on the ring; the rest is on the rods", 0.5, ge=0, lt=1
-    )
-    damping_n_s_m: float = quantity("N s/m", "axial damping of rods and ring sides", 0.0, ge=0)
-    each: tuple[ModuleDifference, ...] = Field(default=(), description="modules that are not like the others")
-
-    def of(self, module: int) -> ModuleSettings:
-        """Return the settings of one module, 0 for the base."""
-        own = next((entry for entry in self.each if entry.module == module), None)
-        if own is None:
-            return self
-        return self.model_copy(update=own.model_dump(exclude_none=True, exclude={"module", "offsets_mm"}))
-
-    def offsets(self) -> dict[tuple[int, str], Vector]:
-        """Return the offset of every node that has one, by module and label [mm]."""
-        return {(e.module, label): offset for e in self.each for label, offset in e.offsets_mm.items()}
 
 
 class SpringBetween(Settings):

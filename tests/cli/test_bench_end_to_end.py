@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -14,36 +12,19 @@ import time
 import numpy as np
 import pytest
 
+from support.loopback import patient_rig
 from support.short_runs import ROOT, SHORT, arguments
 from tcrctl.cli.app import main
-from tcrctl.config import shipped, strict_yaml
+from tcrctl.config import strict_yaml
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.spec import load_spec
 from tcrctl.log.reader import read_log
 
+pytestmark = pytest.mark.slow
+
 #: A test computer is busy; the figure of a real bench is tried in the fault matrix.
 WATCHDOG_MS = 1500
-PATIENT = "safety: {stale_after_ms: 1000, stale_stop_ms: 4000, silence_stop_ms: 4000, following_mm: 20}"
-
-
-def free_ports(count):
-    sockets = [socket.socket() for _ in range(count)]
-    for one in sockets:
-        one.bind(("127.0.0.1", 0))
-    ports = [one.getsockname()[1] for one in sockets]
-    for one in sockets:
-        one.close()
-    return ports
-
-
-def patient_rig():
-    """The shipped loopback rig on ports of its own, which forgives every pause of a busy computer."""
-    text = shipped.rigs()["loopback"].read_text()
-    text = re.sub(r"^safety:.*$", PATIENT, text, flags=re.MULTILINE)
-    for old, new in zip(("15510", "15511", "15600", "15700"), free_ports(4), strict=True):
-        text = text.replace(old, str(new))
-    return re.sub(r"(port: \d+)}", r"\1, timeout_ms: 400}", text)
 
 
 @pytest.fixture(scope="module")

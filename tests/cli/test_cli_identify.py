@@ -15,6 +15,8 @@ from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.spec import load_spec
 from tcrctl.robot.description import load_robot
 
+pytestmark = pytest.mark.slow
+
 KEYS = {
     "status", "mean_error_before_mm", "mean_error_after_mm", "held_out_error_mm", "parameters", "unidentifiable",
     "evaluations", "seconds", "robot_file",

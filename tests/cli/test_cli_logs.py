@@ -196,6 +196,7 @@ def test_an_npz_holds_every_quantity_as_logged(log):
             assert arrays["measurement_nodes_m"][k].tobytes() == step.measurement.nodes.tobytes()
 
 
+@pytest.mark.slow
 def test_a_parquet_file_has_the_columns_and_bits_of_the_csv(log, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     assert tcrctl("export", log, "--parquet", "--nodes")[0] == 0

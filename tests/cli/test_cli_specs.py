@@ -123,6 +123,7 @@ def test_the_schema_allows_off_where_the_file_may_say_off(capsys: Output) -> Non
     assert {"const": "off"} in definitions["SimulatedSettings"]["properties"]["mismatch"]["anyOf"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", sorted(app.VERBS))
 def test_every_verb_explains_itself_with_an_example(verb: str, capsys: Output) -> None:
     assert app.main([verb, "--help"]) == 0
@@ -179,6 +180,7 @@ def test_whatever_a_verb_raises_becomes_one_exit_code(
         assert "Traceback" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_program_starts_without_the_numerical_libraries() -> None:
     heavy = "{'numba', 'scipy', 'mcap', 'numpy', 'rich'}"
     verbs = "['list'], ['validate', 'letter_t'], ['validate', '--robot', 'tcr700']"
@@ -190,6 +192,7 @@ def test_the_program_starts_without_the_numerical_libraries() -> None:
     assert done.stdout.splitlines()[-1] == "[] [0, 0, 0]"
 
 
+@pytest.mark.slow
 def test_the_module_runs_as_a_program_and_without_colour_off_a_terminal() -> None:
     environment = {**os.environ, "NO_COLOR": "1"}
     for arguments, code in ((["--version"], 0), (["show", "letter_q"], 2), (["show"], 2)):

@@ -14,6 +14,7 @@ def _help(call: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", CALLS, ids=" ".join)
 def test_help_shows_no_backslash_but_the_shells_line_continuation(
     call: list[str], capsys: pytest.CaptureFixture[str]

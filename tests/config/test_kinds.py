@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tcrctl.config.unions import kind_of, models_in
+from tcrctl.controller import controller
+from tcrctl.controller.settings import ControllerSettings
 from tcrctl.estimator import estimator
 from tcrctl.estimator.settings import EstimatorSettings
 from tcrctl.experiment import prepare
@@ -17,6 +19,7 @@ from tcrctl.trajectory import trajectory
 from tcrctl.trajectory.settings import TrajectorySettings
 
 TABLES = {
+    "controller": (controller.KINDS, ControllerSettings),
     "trajectory": (trajectory.KINDS, TrajectorySettings),
     "estimator": (estimator.KINDS, EstimatorSettings),
     "plant": (prepare.PLANTS, PlantSettings),

@@ -74,12 +74,14 @@ def test_plain_scalars_follow_the_yaml_1_2_core_schema(text: str, value: object)
     assert (type(found), found) == (type(value), value)
 
 
+@pytest.mark.slow
 @given(trees)
 def test_whatever_is_dumped_is_read_back_unchanged(data: object) -> None:
     found = strict_yaml.loads(strict_yaml.dumps(data)).data
     assert repr(found) == repr(data)  # repr also tells 1 from 1.0 from True
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.from_regex("[a-z]{1,5}", fullmatch=True), trees, min_size=1, max_size=6))
 def test_every_key_is_reported_in_the_line_where_it_stands(data: dict[str, object]) -> None:
     text = strict_yaml.dumps(data)
@@ -206,6 +208,7 @@ def test_a_section_may_be_off_and_a_whole_number_is_a_number() -> None:
     assert settings.model_dump(mode="json")["lead"] == "off"
 
 
+@pytest.mark.slow
 @given(st.data())
 def test_an_override_changes_its_value_and_nothing_else(data: st.DataObject) -> None:
     before = {"a": {"b": [1, {"c": 2}], "d": 3}, "e": 4}

@@ -129,6 +129,7 @@ def test_same_inputs_give_the_same_bytes(tcr700):
     assert runs[0].tobytes() == runs[1].tobytes()
 
 
+@pytest.mark.slow
 def test_it_goes_to_the_target_and_stays(tcr600):
     settings = ioc(weights=CostWeights(speed_change=220.0), offset=OffsetSettings(filter_s=0.5))
     errors, _, infos = closed_loop(tcr600, settings, (0.02, 0.0, 0.04), 8.0)
@@ -136,6 +137,7 @@ def test_it_goes_to_the_target_and_stays(tcr600):
     assert errors[-20:].max() < 1e-4
 
 
+@pytest.mark.slow
 def test_no_lasting_error_on_a_plant_of_other_material(tcr700):
     mismatch = Mismatch(springs_youngs_modulus=0.7, density=1.2)
     errors, speeds, infos = closed_loop(
@@ -149,6 +151,7 @@ def test_no_lasting_error_on_a_plant_of_other_material(tcr700):
 STIFF = Mismatch(springs_youngs_modulus=1.4, cables_youngs_modulus=1.3, density=0.7)
 
 
+@pytest.mark.slow
 def test_a_plant_whose_slow_modes_are_half_as_fast_again_is_held(tcr700):
     errors, _, infos = closed_loop(
         tcr700, pose_settings(), (0.004, 0.002, 0.02), 12.0, STIFF, noise=50.0, latency=10.0
@@ -157,6 +160,7 @@ def test_a_plant_whose_slow_modes_are_half_as_fast_again_is_held(tcr700):
     assert errors[-40:].max() < 2e-4
 
 
+@pytest.mark.slow
 def test_quick_changes_of_speed_pump_up_modes_that_the_model_does_not_know(tcr700):
     """Why W is as large as it is: the same loop with a sixteenth of it."""
     quick = pose_settings().weights.model_copy(update={"speed_change": 3.5e3 / 16})

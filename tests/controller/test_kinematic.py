@@ -71,6 +71,7 @@ def test_tensions_come_back_while_the_end_stays(tcr700):
     assert np.linalg.norm(pose.position(end.q, tcr700.tip) - pose.position(start.q, tcr700.tip)) < 1e-5
 
 
+@pytest.mark.slow
 def test_it_arrives_on_a_plant_of_other_material(tcr600):
     mismatch = Mismatch(springs_youngs_modulus=0.7, density=1.2)
     errors, speeds, infos = closed_loop(tcr600, kinematic(), (0.01, 0.0, 0.03), 25.0, mismatch)
@@ -80,6 +81,7 @@ def test_it_arrives_on_a_plant_of_other_material(tcr600):
     assert np.abs(speeds).max() <= 0.05
 
 
+@pytest.mark.slow
 def test_too_high_a_gain_shakes_the_slow_modes_up(tcr600):
     """So there is something for the dynamic model to do."""
     errors, _, _ = closed_loop(tcr600, kinematic(gain_1_s=3.0), (0.005, 0.0, 0.02), 8.0)

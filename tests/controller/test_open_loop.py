@@ -198,6 +198,7 @@ def test_experiments_whose_parts_do_not_fit_are_refused(overrides, said):
     assert said in str(caught.value)
 
 
+@pytest.mark.slow
 def test_the_closed_loop_can_be_asked_for_the_pose_of_given_drives():
     weights = "{kind: ioc, output: pose, weights: {normal: 44}}"
     experiment = prepare(load_spec("table2_s_shape", [f"controller={weights}"]))
@@ -205,6 +206,7 @@ def test_the_closed_loop_can_be_asked_for_the_pose_of_given_drives():
     assert path.error.max() < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "drives_mm"),
     [

@@ -63,6 +63,7 @@ def test_with_a_short_filter_the_measured_end_counts_as_the_place_of_rest(tcr700
     np.testing.assert_allclose(forecast.prediction.free[:, :3], expected, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_on_a_perfect_plant_bare_statics_come_to_the_target(tcr700):
     settings = pose_settings(prediction="static", integral="off", offset="off")
     errors, _, infos = closed_loop(tcr700, settings, (0.0, 0.0, 0.03), 8.0)
@@ -70,6 +71,7 @@ def test_on_a_perfect_plant_bare_statics_come_to_the_target(tcr700):
     assert np.mean(errors[-20:]) < 3e-4
 
 
+@pytest.mark.slow
 def test_bare_statics_keep_the_error_of_a_mismatched_model(tcr700):
     """They do not look at the measured end; the plant's own sag stays."""
     errors, _, _ = closed_loop(
@@ -82,6 +84,7 @@ def test_bare_statics_keep_the_error_of_a_mismatched_model(tcr700):
     assert np.mean(errors[-20:]) > 5e-4
 
 
+@pytest.mark.slow
 def test_statics_that_feed_the_measured_end_back_shake_the_slow_modes_up(tcr700):
     """Fig. 16: a controller that takes the end for one that follows at once diverges; the dynamic one holds."""
     largest = {}

@@ -73,6 +73,7 @@ def internal(model, q, w):
     return before._replace(w=w, nodal=np.zeros_like(before.nodal))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("w", [STATIC, DAMPED])
 @pytest.mark.parametrize("stretch", [0.05, -0.05])
 @pytest.mark.parametrize("tension_only", [0.0, 1.0])
@@ -93,6 +94,7 @@ def test_a_bars_tension_is_hookes_law_plus_viscous_drag():
     assert bar.tension(length, DAMPED, 0.99 * length, model.bars, 0) == pytest.approx(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("w", [STATIC, DAMPED])
 @pytest.mark.parametrize("slack", [False, True])
 @given(angles=st.lists(ANGLES, min_size=2, max_size=4))

@@ -62,6 +62,7 @@ def test_velocity_follows_within_half_a_period(tcr600):
     assert np.sqrt(np.mean(error**2)) < 0.25 * np.sqrt(np.mean(true**2))
 
 
+@pytest.mark.slow
 def test_the_end_pose_has_no_lasting_error_on_other_material(tcr700):
     mismatch = Mismatch(springs_youngs_modulus=0.7, density=1.2)
     states = list(watch(tcr700, 8.0, mismatch=mismatch, noise=50.0))[-40:]
@@ -71,6 +72,7 @@ def test_the_end_pose_has_no_lasting_error_on_other_material(tcr700):
     assert np.linalg.norm(normal) < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ring", [1, 7, 13])
 def test_a_ring_that_is_not_seen_for_two_seconds_does_no_harm(tcr700, ring):
     def hide(k, measured):

@@ -19,6 +19,7 @@ def test_there_are_experiments():
     assert "letter_t" in NAMES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_shipped_experiment_is_feasible_with_room_to_correct(name):
     experiment = prepare(load_spec(name))

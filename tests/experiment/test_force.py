@@ -57,6 +57,7 @@ def within_limits(log):
     return np.abs(speed).max()
 
 
+@pytest.mark.slow
 def test_forced_out_of_reach_it_stops_with_exit_code_4_and_a_complete_log(tmp_path, capsys):
     code, printed, _ = run("laser_pipe", OUT_OF_REACH, tmp_path, capsys, "--force")
     assert (code, printed["status"]) == (4, "aborted")
@@ -66,6 +67,7 @@ def test_forced_out_of_reach_it_stops_with_exit_code_4_and_a_complete_log(tmp_pa
     within_limits(log)
 
 
+@pytest.mark.slow
 def test_forced_too_fast_it_saturates_and_goes_on(tmp_path, capsys):
     code, printed, _ = run("fixed_point_rotation", TOO_FAST, tmp_path, capsys, "--force")
     assert (code, printed["status"]) == (0, "success")

@@ -58,6 +58,7 @@ def test_position_errors_are_those_of_the_plant_or_else_of_the_estimate(truth):
     assert (found.steps, found.duration_s) == (N, pytest.approx(N * records.PERIOD_S))
 
 
+@pytest.mark.slow
 @settings(deadline=None)  # the first call loads kernels
 @given(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(-0.6, 0.6), st.floats(-0.6, 0.6))
 def test_orientation_errors_are_those_of_the_angles(turn_x, turn_y, theta_x, theta_y):

@@ -47,6 +47,7 @@ def commands(log):
     return b"".join(s.wanted.speed.tobytes() + s.applied.drive.tobytes() for s in log.steps())
 
 
+@pytest.mark.slow
 def test_every_step_is_in_the_log_once_and_in_order(short, finished):
     summary, log = finished
     steps = list(log.steps())
@@ -104,6 +105,7 @@ def test_the_reference_begins_where_the_plant_is(short, finished):
     np.testing.assert_allclose(first.reference.position, first.truth.position, atol=5e-5)
 
 
+@pytest.mark.slow
 def test_without_a_sight_of_the_tip_ring_the_reference_is_the_trajectory(tmp_path):
     experiment = prepare(short_spec("plant.measured_rings=[3, 6, 9]"))
     summary = run_experiment(experiment, out=tmp_path)
@@ -113,6 +115,7 @@ def test_without_a_sight_of_the_tip_ring_the_reference_is_the_trajectory(tmp_pat
     assert [event.level for event in log.events() if event.kind == "start"] == ["warning"]
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_commands_another_seed_does_not(short, finished, tmp_path):
     again = read_log(run_experiment(prepare(short.loaded), out=tmp_path).log)
     assert commands(again) == commands(finished[1])
@@ -122,6 +125,7 @@ def test_the_same_seed_gives_the_same_commands_another_seed_does_not(short, fini
     assert other.start["seed"] == "7"
 
 
+@pytest.mark.slow
 def test_no_kernel_is_compiled_or_loaded_during_a_run(tmp_path):
     program = (
         "import sys; sys.path[:0] = sys.argv[1:3]\n"
@@ -190,6 +194,7 @@ def test_a_plant_that_fails_leaves_a_finished_log_and_is_closed(
     assert json.loads((summary.log.parent / "summary.json").read_text())["status"] == status
 
 
+@pytest.mark.slow
 def test_a_plant_that_cannot_be_closed_is_an_error_even_after_the_last_step(short, tmp_path, monkeypatch):
     failing_plant(monkeypatch, DeviceError("brake stuck"), close=True)
     summary = run_experiment(short, out=tmp_path)
@@ -208,6 +213,7 @@ def test_a_fault_of_the_program_leaves_a_finished_log_and_a_closed_plant(short, 
     assert "a bug" in log.stop["reason"]
 
 
+@pytest.mark.slow
 def test_a_controller_that_raises_leaves_a_finished_log_and_a_closed_plant(short, tmp_path, monkeypatch):
     closed = failing_plant(monkeypatch, DeviceError("unused"))
     control = InstantaneousOptimalControl.control
@@ -261,6 +267,7 @@ def test_a_disk_that_fills_up_is_an_error_and_the_plant_is_closed(short, tmp_pat
     assert len(closed) == 1
 
 
+@pytest.mark.slow
 def test_a_run_on_a_file_system_that_is_full_says_so_in_its_log(tiny_filesystem, tmp_path, capsys):
     options = ["--json", "--out", str(tiny_filesystem), *arguments("trajectory.settle_s=5")]
     assert main(["run", "letter_t", *options, "--set", "log.flush_steps=20"]) == 5
@@ -290,6 +297,7 @@ def test_a_run_beyond_the_safety_limit_is_aborted_with_exit_code_4(short, tmp_pa
     assert last.k + 1 == summary.measures.steps
 
 
+@pytest.mark.slow
 def test_run_prints_one_object_and_fails_a_criterion_with_exit_code_3(tmp_path, capsys):
     options = ["--json", "--out", str(tmp_path), *arguments("criteria=[position_error_mm.max <= 0.001]")]
     assert main(["run", "letter_t", *options]) == 3
@@ -301,6 +309,7 @@ def test_run_prints_one_object_and_fails_a_criterion_with_exit_code_3(tmp_path, 
     assert "position_error_mm.max is" in printed.err
 
 
+@pytest.mark.slow
 def test_run_prints_a_table_and_where_the_log_is(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "letter_t", *arguments()]) == 0
@@ -333,6 +342,7 @@ BAD_INPUT = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BAD_INPUT)
 @pytest.mark.parametrize("as_json", [False, True])
 def test_bad_input_is_one_message_and_leaves_nothing(name, as_json, tmp_path, monkeypatch, capsys):
@@ -355,6 +365,7 @@ def test_bad_input_is_one_message_and_leaves_nothing(name, as_json, tmp_path, mo
     assert [path.name for path in tmp_path.iterdir()] == ["a_file"]
 
 
+@pytest.mark.slow
 def test_an_infeasible_trajectory_runs_if_forced(tmp_path, capsys):
     overrides = arguments("controller.speed_limit_mm_s=3")
     assert main(["run", "letter_t", "--out", str(tmp_path), *overrides]) == 2
@@ -416,6 +427,7 @@ def once_running(folder, steps=30):
     raise TimeoutError(f"no run in {folder}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "number", "code"),
     [("int", signal.SIGINT, 130), ("term", signal.SIGTERM, 143), ("json", signal.SIGTERM, 143)],
@@ -443,6 +455,7 @@ def test_a_signal_ends_a_run_with_a_complete_log(running, name, number, code):
         assert "aborted" in out
 
 
+@pytest.mark.slow
 def test_a_killed_run_keeps_all_steps_but_those_of_the_last_flush_interval(running):
     process, folder = running["kill"]
     path = once_running(folder)
@@ -472,6 +485,7 @@ def test_paced_steps_begin_a_period_apart(running):
     assert columns["timing_lateness"].min() >= 0.0
 
 
+@pytest.mark.slow
 def test_a_run_that_begins_far_from_its_trajectory_is_longer_by_the_way_there_says_so_and_replays(tmp_path):
     far = prepare(short_spec("start.blend_s=0.1", "start.approach_mm_s=5"))
     summary = run_experiment(far, out=tmp_path)

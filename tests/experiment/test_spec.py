@@ -201,6 +201,7 @@ limits = st.floats(allow_nan=False, allow_infinity=False) | st.booleans()
 criteria = st.builds(Criterion, names, st.sampled_from(sorted(RELATIONS)), limits)
 
 
+@pytest.mark.slow
 @given(criteria)
 def test_a_criterion_reads_back_what_it_writes(criterion: Criterion) -> None:
     adapter: TypeAdapter[Criterion] = TypeAdapter(CriterionText)

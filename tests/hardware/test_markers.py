@@ -65,6 +65,7 @@ def test_every_labelled_node_lands_in_its_row_whatever_the_order_of_the_markers(
     assert located.positions == pytest.approx(REST, abs=1e-7)
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_unlabelled_nodes_are_followed_through_motion_loss_and_ghosts(seed):

@@ -249,6 +249,7 @@ def act(both, what, wanted, vmax, scans):
     both.run(scans)
 
 
+@pytest.mark.slow
 @settings(
     max_examples=40, phases=(Phase.explicit, Phase.generate)
 )  # a difference is told at once, not made smaller

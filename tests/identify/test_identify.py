@@ -27,6 +27,8 @@ from tcrctl.identify.statics import make_twins, rest_shapes, shape_slopes
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.robot import build_robot
 
+pytestmark = pytest.mark.slow
+
 DRIVES = np.array([[12, 2, -4, 2], [6, 6, 6, 6]]) / 1e3
 EVERY_KIND = (
     SPRINGS,

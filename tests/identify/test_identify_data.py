@@ -90,6 +90,7 @@ def refused(tmp_path, parameters=(SPRINGS,), **more) -> str:
     return str(raised.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [

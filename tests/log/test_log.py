@@ -45,6 +45,7 @@ def reencoded_as_stored(name):
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(f"tcrctl.v1.{name}"))
 
 
+@pytest.mark.slow
 @given(records.steps())
 @settings(max_examples=80, deadline=None)
 def test_a_step_survives_encoding_bit_for_bit(step):
@@ -52,6 +53,7 @@ def test_a_step_survives_encoding_bit_for_bit(step):
     assert records.fingerprint(decoded) == records.fingerprint(step)
 
 
+@pytest.mark.slow
 @given(records.steps())
 @settings(max_examples=40, deadline=None)
 def test_the_stored_schema_gives_viewers_the_same_numbers(step):
@@ -66,6 +68,7 @@ def test_the_stored_schema_gives_viewers_the_same_numbers(step):
     assert seen.HasField("truth") == (step.truth is not None)
 
 
+@pytest.mark.slow
 @given(records.steps())
 @settings(max_examples=25, deadline=None)
 def test_arbitrary_steps_survive_a_file_bit_for_bit(tmp_path_factory, step):
@@ -155,6 +158,7 @@ def test_every_unit_of_the_step_is_in_the_channel_metadata(finished):
     assert derived == {"/log", *TOPICS}
 
 
+@pytest.mark.slow
 def test_an_independent_checker_finds_no_fault(finished, tmp_path):
     assert doctor(finished).returncode == 0, doctor(finished).stdout
     empty = tmp_path / "empty.mcap"

@@ -68,6 +68,7 @@ def log_until_failure(path, **options):
     return caught.value, accepted
 
 
+@pytest.mark.slow
 def test_a_full_disk_stops_the_run_and_keeps_what_was_flushed(tmp_path, expected):
     room = 60_000
     path = tmp_path / "log.mcap"
@@ -104,6 +105,7 @@ def test_a_disk_too_full_to_start_leaves_nothing_behind(tmp_path):
     assert not path.exists()
 
 
+@pytest.mark.slow
 def test_a_really_full_file_system_stops_the_run_and_keeps_what_was_flushed(
     tiny_filesystem, tmp_path, expected
 ):

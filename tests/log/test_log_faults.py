@@ -33,6 +33,7 @@ def whole(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_a_file_cut_anywhere_yields_a_prefix_without_a_corrupt_step(whole, tmp_path, expected):
     data = whole.read_bytes()
     cuts = np.unique(np.random.default_rng(0).integers(0, len(data), 200))
@@ -52,6 +53,7 @@ def test_a_file_cut_anywhere_yields_a_prefix_without_a_corrupt_step(whole, tmp_p
     assert lengths[-1] >= N_STEPS - 8
 
 
+@pytest.mark.slow
 def test_recovery_of_a_file_cut_anywhere_keeps_every_readable_step(whole, tmp_path, expected):
     data = whole.read_bytes()
     for i, cut in enumerate(np.linspace(200, len(data), 25).astype(int)):
@@ -80,6 +82,7 @@ def test_recovery_of_a_complete_log_loses_nothing(whole, tmp_path, expected):
         recover(whole, whole)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", [0, 3])
 def test_a_damaged_chunk_is_reported_and_recovery_saves_all_others(whole, tmp_path, which):
     data = bytearray(whole.read_bytes())
@@ -125,6 +128,7 @@ def start_child(path, **options):
     return child
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flush_s", "flush_steps", "at_least", "at_most"), [(60.0, 10, 30, 35), (0.2, 1000, 35, 35)]
 )
@@ -141,6 +145,7 @@ def test_kill_9_loses_at_most_one_flush_interval(tmp_path, expected, flush_s, fl
     assert doctor(tmp_path / "mended.mcap").returncode == 0
 
 
+@pytest.mark.slow
 def test_sigterm_leaves_a_finished_log(tmp_path, expected):
     path = tmp_path / "log.mcap"
     with start_child(path, flush_s=60.0, flush_steps=1000, n=35) as child:
@@ -153,6 +158,7 @@ def test_sigterm_leaves_a_finished_log(tmp_path, expected):
     assert is_prefix(path, expected) == 35
 
 
+@pytest.mark.slow
 def test_a_program_that_forgets_the_log_still_ends_and_finishes_it(tmp_path, expected):
     path = tmp_path / "log.mcap"
     program = f"""
@@ -170,6 +176,7 @@ raise SystemExit(7)
     assert is_prefix(path, expected) == 1
 
 
+@pytest.mark.slow
 def test_an_exception_in_the_run_is_in_the_stop_record(tmp_path, expected):
     path = tmp_path / "log.mcap"
 

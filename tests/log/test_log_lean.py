@@ -53,6 +53,7 @@ def test_zigzag_and_planes_can_be_undone(numbers):
     np.testing.assert_array_equal(from_planes(planes(array)), array)
 
 
+@pytest.mark.slow
 @given(records.steps(), records.steps(), st.booleans())
 @settings(max_examples=30)
 def test_lean_steps_keep_arbitrary_input_bit_for_bit(first, second, same_markers):
@@ -97,6 +98,7 @@ def test_columns_of_a_lean_log_have_nan_where_there_is_no_state(lean):
     assert np.isfinite(columns["measurement_nodes"]).all()
 
 
+@pytest.mark.slow
 def test_a_chunk_of_lean_steps_can_be_read_without_the_others(lean, tmp_path):
     data = bytearray(lean.read_bytes())
     start = -1

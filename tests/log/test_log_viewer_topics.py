@@ -105,6 +105,7 @@ def test_a_free_orientation_has_no_wanted_axis(tmp_path):
     assert (len(wanted.spheres), len(wanted.arrows)) == (1, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("topic", [*TOPICS, "/log"])
 def test_schemas_are_those_of_foxglove(finished, topic):
     """Their own kit is the judge: every field of ours has the same name, number, type and place there."""

@@ -95,6 +95,7 @@ def scaled_residual(M, q, z):
     return max(below_w, below_z, product / max(1.0, z.max() / largest))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["generic", "on constraints", "grid"])
 @pytest.mark.parametrize("condition", [1e0, 1e2, 1e4, 1e6, 1e8])
 def test_box_qps_with_soft_rows_have_the_optimum_an_independent_solver_finds(condition, kind):
@@ -161,6 +162,7 @@ def complementary_solutions(M, q):
             yield z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", range(1, 7))
 def test_p_matrices_have_the_one_solution_that_enumeration_finds(n):
     rng = np.random.default_rng(n)
@@ -221,6 +223,7 @@ def test_an_empty_problem_is_solved():
     assert (z.size, w.size, pivots, status) == (0, 0, 0, lcp.SOLVED)
 
 
+@pytest.mark.slow
 def test_frozen_arguments_of_any_layout_give_the_same_answer_and_stay_unchanged():
     M, q = np.array([[2.0, 1.0], [0.0, 2.0]]), np.array([-1.0, -3.0])
     expected = solve_lcp(M, q)

@@ -42,6 +42,7 @@ def same_rotation(a, b, tolerance=TIGHT):
     return min(np.abs(a - b).max(), np.abs(a + b).max()) < tolerance
 
 
+@pytest.mark.slow
 @untimed
 @given(quaternions, quaternions, quaternions)
 def test_rotations_are_a_group(a, b, c):
@@ -52,6 +53,7 @@ def test_rotations_are_a_group(a, b, c):
     assert np.allclose(quaternion_multiply(a, quaternion_conjugate(a)), IDENTITY, atol=TIGHT)
 
 
+@pytest.mark.slow
 @untimed
 @given(quaternions, quaternions)
 def test_matrices_multiply_like_quaternions_and_agree_with_scipy(a, b):
@@ -62,6 +64,7 @@ def test_matrices_multiply_like_quaternions_and_agree_with_scipy(a, b):
     assert np.allclose(matrix_from_quaternion(a), Rotation.from_quat(np.roll(a, -1)).as_matrix(), atol=TIGHT)
 
 
+@pytest.mark.slow
 @untimed
 @given(quaternions)
 def test_a_matrix_gives_back_its_quaternion(q):
@@ -160,6 +163,7 @@ def test_slerp_keeps_its_ends_for_any_distance(a, exponent):
     assert np.allclose(ends, [a, b], atol=4e-15, rtol=0.0)
 
 
+@pytest.mark.slow
 @untimed
 @given(quaternions, quaternions, fractions)
 def test_quaternion_slerp_turns_the_short_way_at_constant_speed(a, b, fraction):

@@ -32,6 +32,7 @@ def test_small_maps_are_exact(size, radius, seed):
     assert found.radius == pytest.approx(radius, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [DENSE + 1, 90, 200])
 @pytest.mark.parametrize("radius", [0.98, 1.05])
 def test_large_maps_are_found_by_products_alone(size, radius):

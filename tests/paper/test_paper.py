@@ -249,6 +249,7 @@ def test_the_displacements_of_table_2_keep_their_lengths_in_the_robots_frame(tcr
     assert all(model[name][2] > 0.0 for name in CONFIGURATIONS)  # pulling shortens
 
 
+@pytest.mark.slow
 def test_a_real_row_from_the_command_to_the_number(tmp_path, capsys):
     assert main(["paper", "--only", "table2", "--json", "--quiet", "--out", str(tmp_path)]) == 0
     (line,) = json.loads(capsys.readouterr().out)["rows"]

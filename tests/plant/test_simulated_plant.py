@@ -29,6 +29,7 @@ def rings(robot, q):
     return q.reshape(-1, 3)[ring_rows(robot.n_modules)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("latency_ms", [0.0, 10.0, 50.0, 60.0, 150.0, 165.0])
 def test_without_noise_a_measurement_is_the_truth_one_latency_earlier(tcr5x4, latency_ms):
     """The reference plant runs with a period of 5 ms, which divides every latency."""

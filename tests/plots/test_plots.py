@@ -25,6 +25,8 @@ from tcrctl.numerics.rotation import angle_between, angles_from_normal
 from tcrctl.plots import FIGURES, draw, save
 from tcrctl.robot.robot import Robot
 
+pytestmark = pytest.mark.slow
+
 N_STEPS = 40
 SPEC = load_spec("letter_t", ["controller.speed_limit_mm_s=6"])
 

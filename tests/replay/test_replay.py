@@ -30,6 +30,8 @@ from tcrctl.replay.figure import WhatIf
 from tcrctl.replay.replay import replay
 from tcrctl.replay.result import Tolerance, Window
 
+pytestmark = pytest.mark.slow
+
 VARIANTS = {
     "full": (),
     "often_flushed": ("log.flush_steps=10", "log.flush_s=0.1"),

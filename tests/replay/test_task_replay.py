@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from support.short_runs import BELOW
 from tcrctl.cli.app import main
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.spec import load_spec
+
+pytestmark = pytest.mark.slow
 
 
 def test_what_if_on_a_log_whose_trajectory_goes_to_a_target(tmp_path, capsys):

@@ -216,6 +216,7 @@ def test_a_run_without_truth_normals_files_or_end_is_shown_as_far_as_it_goes(tmp
     assert f"{error:.4g} mm max" in said
 
 
+@pytest.mark.slow
 def test_the_command_names_the_file_and_never_replaces_one_unasked(tmp_path, capsys):
     log = write(tmp_path / "log.mcap")
     assert main(["report", str(tmp_path)]) == 0

@@ -81,6 +81,7 @@ def test_a_static_equilibrium_is_a_fixed_point(robot):
     np.testing.assert_allclose(motion.work.tension, rest.tension, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rho", [0.8, 0.3])
 def test_positions_and_velocities_converge_with_the_square_of_the_step(robot, rho):
     start = swinging(robot)
@@ -99,6 +100,7 @@ def test_positions_and_velocities_converge_with_the_square_of_the_step(robot, rh
     assert np.all(order[-1] > 1.9), order
 
 
+@pytest.mark.slow
 def test_without_dampers_and_dissipation_energy_is_kept(robot):
     model = mechanics.undamped(robot.model)
     motion, energy = swinging(robot, model, rho=1.0), mechanics.EnergyMeter(model, robot.weight)
@@ -153,6 +155,7 @@ def imbalance(robot, step, duration=0.2):
     return work - (energy(motion.state) - start) - lost, work
 
 
+@pytest.mark.slow
 def test_the_work_of_the_drives_is_stored_or_dissipated(robot):
     coarse, work = imbalance(robot, 2e-3)
     fine, _ = imbalance(robot, 1e-3)

@@ -115,6 +115,7 @@ def test_without_the_tangent_the_residual_is_the_same_and_k_is_untouched(robot):
     assert np.isnan(bare.K).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["statics", "generalized-alpha"])
 @pytest.mark.parametrize("seed", [0, 3])
 def test_structured_solves_equal_dense_ones(robot, rule, seed):
@@ -131,6 +132,7 @@ def test_structured_solves_equal_dense_ones(robot, rule, seed):
     np.testing.assert_allclose(many, expected, rtol=0, atol=scale * np.abs(expected).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["statics", "generalized-alpha"])
 def test_gains_of_the_drives_equal_dense_ones(robot, rule):
     ws, A = linearised(robot, rule)

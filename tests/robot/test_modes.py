@@ -49,6 +49,7 @@ def crossings(signal, step):
     return 0.5 / (np.diff(times).mean() * step)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tcr600", "tcr700"])
 @pytest.mark.parametrize("number", [0, 2])
 def test_a_robot_pushed_along_a_mode_swings_at_its_frequency(name, number, request):

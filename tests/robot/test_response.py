@@ -87,6 +87,7 @@ def without_dampers(robot):
     return mechanics.undamped(robot.model)._replace(damping=robot.model.damping)
 
 
+@pytest.mark.slow
 def test_small_motions_are_those_of_the_nonlinear_robot_up_to_second_order(robot):
     bent = Bent(robot, basis_modes=40, model=without_dampers(robot))
     u = 0.02 * np.cos(1.0 + np.arange(robot.n_cables))
@@ -104,6 +105,7 @@ def test_small_motions_are_those_of_the_nonlinear_robot_up_to_second_order(robot
     assert small < 0.3 * large
 
 
+@pytest.mark.slow
 def test_the_end_position_is_forecast_within_two_per_cent(robot):
     """With the shipped basis and all dampers of the plant."""
     bent = Bent(robot)
@@ -148,6 +150,7 @@ def test_responses_converge_with_the_square_of_the_step(robot):
     assert np.all((order > 1.8) & (order < 2.2)), order
 
 
+@pytest.mark.slow
 def test_the_response_is_linear_in_the_state(robot):
     bent = Bent(robot)
     a, b = slow_velocity(bent, 0.01), np.roll(slow_velocity(bent, 0.02), 3)

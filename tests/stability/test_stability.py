@@ -33,6 +33,8 @@ from tcrctl.stability.analysis import analysed_steps, inner_radius, linearisable
 from tcrctl.stability.closed_loop import ClosedLoop, StepMap
 from tcrctl.stability.report import StabilityPoint, StabilityReport
 
+pytestmark = pytest.mark.slow
+
 MISMATCH = Mismatch(springs_youngs_modulus=0.7, density=1.2)
 
 

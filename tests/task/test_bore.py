@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,6 +26,7 @@ def aimed(shift, turn, before):
     )
 
 
+@pytest.mark.slow
 @given(st.tuples(small, small), st.tuples(angle, angle), st.floats(0.001, 0.1))
 def test_the_clearance_is_that_of_the_worst_point_on_the_way_through(shift, turn, before):
     origin, direction = aimed(shift, turn, before)

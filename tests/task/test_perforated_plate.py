@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -67,6 +68,7 @@ def test_distances_beyond_the_farthest_of_interest_are_cut(start, end, farthest)
     assert abs(cut - min(full, farthest)) <= 2.0 * TOLERANCE
 
 
+@pytest.mark.slow
 @given(points, points)
 def test_a_segment_that_crosses_the_material_touches_it_and_one_through_a_hole_does_not(start, end):
     if crosses(start, end, HALF, HOLES):
@@ -84,6 +86,7 @@ def test_a_segment_through_the_middle_of_a_hole_is_as_far_as_its_rim():
     assert math.isclose(segment_distance(start, end, HALF, HOLES, 1.0, TOLERANCE), radius, abs_tol=TOLERANCE)
 
 
+@pytest.mark.slow
 @given(points, points, points)
 def test_nothing_changes_when_plates_and_segments_move_together(start, end, rotation):
     still = Plates(np.zeros((1, 3)), np.eye(3)[None], HALF[None], np.array([0, 2]), HOLES)

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -41,6 +42,7 @@ def test_what_is_too_far_or_around_the_camera_is_not_seen():
     assert not in_view(EYE, -AHEAD, 0.05 * AHEAD, 0.01, HALF, 0.08)
 
 
+@pytest.mark.slow
 @given(points, points, points, st.floats(0.001, 0.03))
 def test_a_ball_hides_a_point_if_it_meets_the_line_of_sight(eye, target, centre, radius):
     assume(np.linalg.norm(target - eye) > 1e-3)

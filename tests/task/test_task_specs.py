@@ -71,6 +71,7 @@ def test_a_target_needs_a_task(tmp_path):
         load_spec(str(path))
 
 
+@pytest.mark.slow
 def test_a_run_from_markers_to_the_log(tmp_path):
     summary = run_experiment(prepare(load_spec("laser_pipe", BELOW)), out=tmp_path)
     assert (summary.status, summary.exit_code) == ("success", 0)
@@ -84,6 +85,7 @@ def test_a_run_from_markers_to_the_log(tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_a_missed_target_fails_its_criterion_with_exit_code_3(tmp_path, capsys):
     overrides = [part for text in (*BELOW, "task.beam_mm=15.999") for part in ("--set", text)]
     assert main(["run", "laser_pipe", "--quiet", "--json", "--out", str(tmp_path), *overrides]) == 3
@@ -93,6 +95,7 @@ def test_a_missed_target_fails_its_criterion_with_exit_code_3(tmp_path, capsys):
     assert [item["passed"] for item in printed["criteria"]] == [False, True]
 
 
+@pytest.mark.slow
 def test_the_table_for_people_tells_what_the_task_found(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     overrides = [part for text in (*BELOW, "task.beam_mm=15.999") for part in ("--set", text)]

@@ -71,6 +71,7 @@ def moved(settings, turn, shift):
     return [(rotation @ np.array(marker) + 1e3 * shift).tolist() for marker in settings]
 
 
+@pytest.mark.slow
 @given(vectors, vectors)
 def test_the_pose_of_a_pipe_moves_with_its_markers(turn, shift):
     rotation = matrix_from_quaternion(quaternion_exp(10.0 * turn))
@@ -83,6 +84,7 @@ def test_the_pose_of_a_pipe_moves_with_its_markers(turn, shift):
     assert np.allclose(pipe.target.normal, -pipe.bore.axis)
 
 
+@pytest.mark.slow
 @given(vectors, vectors)
 def test_the_pose_of_a_box_moves_with_its_markers(turn, shift):
     rotation = matrix_from_quaternion(quaternion_exp(10.0 * turn))
@@ -229,6 +231,7 @@ def test_what_is_first_seen_after_a_collision_does_not_count():
     assert seen.result()["smallest_clearance_mm"] <= 0.0
 
 
+@pytest.mark.slow
 @given(vectors)
 def test_the_clearance_is_that_of_the_nearest_ring_or_rod(shift):
     shift = shift + np.array([0.3, 0.0, 0.1])

@@ -56,6 +56,7 @@ def pieces_at_a_corner(draw):
     return before, PlanePiece(0j, cmath.exp(1j * turn), draw(curvature), draw(length))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=200)
 @given(pieces_at_a_corner(), st.floats(0.2, 6.0))
 def test_a_rounding_arc_is_tangent_to_whatever_meets_in_the_corner(pieces, radius):

@@ -126,6 +126,7 @@ def test_normals_are_unit_vectors(section):
     assert np.abs(np.linalg.norm(normal, axis=1) - 1.0).max() < 1e-12
 
 
+@pytest.mark.slow
 @law
 @given(st.one_of(pose_sections, tours()))
 def test_position_and_normal_are_three_times_continuously_differentiable(section):
@@ -143,6 +144,7 @@ def test_position_and_normal_are_three_times_continuously_differentiable(section
         assert jumps[1] <= 0.6 * jumps[0] + 1e-5
 
 
+@pytest.mark.slow
 @law
 @given(tours())
 def test_waypoints_keep_speed_acceleration_and_angular_limits(section):
@@ -176,6 +178,7 @@ def test_a_leg_is_straight_and_turns_the_normal_by_the_smallest_angle(section):
         assert turned == pytest.approx(angle_between(normal[0], normal[-1]), abs=1e-9)
 
 
+@pytest.mark.slow
 @law
 @given(tours())
 def test_every_waypoint_is_reached_and_held_for_its_dwell(section):
@@ -210,6 +213,7 @@ def test_a_waypoint_at_the_rest_pose_is_a_rest():
     assert np.allclose(trajectory.normal(t), UP, atol=1e-15)
 
 
+@pytest.mark.slow
 @law
 @given(revolutions)
 def test_a_revolution_runs_from_its_first_to_its_last_radius_height_and_tilt(section):
@@ -303,6 +307,7 @@ def test_a_scan_through_a_hole_that_looks_down_tilts_along_x_first():
     assert np.allclose(normal, [math.sin(math.radians(20)), 0.0, math.cos(math.radians(20))], atol=1e-12)
 
 
+@pytest.mark.slow
 @law
 @given(st.one_of(pose_sections, tours()))
 def test_many_times_at_once_are_as_good_as_one_by_one(section):

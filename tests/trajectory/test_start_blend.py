@@ -32,6 +32,7 @@ class Free(Swing):
         return None
 
 
+@pytest.mark.slow
 @settings(deadline=None)  # the first call loads kernels
 @given(places, angles, angles, st.floats(0.1, 5.0))
 def test_it_begins_where_the_robot_is_and_joins_the_trajectory(offset, theta_x, theta_y, blend):

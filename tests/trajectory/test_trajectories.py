@@ -25,6 +25,7 @@ from support.drawings import (
 from tcrctl.trajectory.strokes import moves
 
 
+@pytest.mark.slow
 @law
 @given(drawings, limits, st.sampled_from(["stop", "round"]))
 def test_every_drawing_keeps_its_speed_and_acceleration_limits(strokes, limit, corner):
@@ -39,6 +40,7 @@ def test_every_drawing_keeps_its_speed_and_acceleration_limits(strokes, limit, c
     assert np.linalg.norm(acceleration, axis=1).max() <= limit["acceleration_limit_mm_s2"] * (1 + 1e-6)
 
 
+@pytest.mark.slow
 @law
 @given(drawings, limits)
 def test_every_move_starts_and_ends_at_rest_with_ramps_no_shorter_than_asked(strokes, limit):
@@ -51,6 +53,7 @@ def test_every_move_starts_and_ends_at_rest_with_ramps_no_shorter_than_asked(str
         assert all(p.duration >= limit["ramp_s"] for p in move.phases if p.v0 != p.v1)
 
 
+@pytest.mark.slow
 @law
 @given(drawings, limits)
 def test_the_duration_is_that_of_all_moves_and_rests(strokes, limit):
@@ -60,6 +63,7 @@ def test_the_duration_is_that_of_all_moves_and_rests(strokes, limit):
     assert built(section).duration == pytest.approx(moving + 1.5 + 0.25 * len(strokes) + 2.0)
 
 
+@pytest.mark.slow
 @law
 @given(drawings, limits)
 def test_the_drawing_starts_at_the_rest_position_and_ends_at_its_last_point(strokes, limit):
@@ -72,6 +76,7 @@ def test_the_drawing_starts_at_the_rest_position_and_ends_at_its_last_point(stro
     assert trajectory.normal(np.array([0.0])) is None
 
 
+@pytest.mark.slow
 @law
 @given(polylines(), limits)
 def test_a_polyline_passes_through_every_vertex_and_never_leaves_its_edges(stroke, limit):
@@ -86,6 +91,7 @@ def test_a_polyline_passes_through_every_vertex_and_never_leaves_its_edges(strok
     assert distance.max() < 1e-9
 
 
+@pytest.mark.slow
 @law
 @given(polylines(), limits)
 def test_acceleration_is_continuous_on_straight_moves(stroke, limit):
@@ -96,6 +102,7 @@ def test_acceleration_is_continuous_on_straight_moves(stroke, limit):
     assert np.linalg.norm(np.diff(acceleration, axis=0), axis=1).max() <= jerk * DT * (1 + 1e-6) + 1e-6
 
 
+@pytest.mark.slow
 @law
 @given(arcs(), limits)
 def test_an_arc_keeps_its_distance_and_covers_its_angle_in_its_direction(stroke, limit):
@@ -112,6 +119,7 @@ def test_an_arc_keeps_its_distance_and_covers_its_angle_in_its_direction(stroke,
     assert np.all(np.diff(angle) * (arc["to_deg"] - arc["from_deg"]) >= -1e-6)
 
 
+@pytest.mark.slow
 @law
 @given(tangent_paths(), limits)
 def test_tangent_joins_are_passed_without_stopping(stroke, limit):
@@ -145,6 +153,7 @@ def test_a_ramp_on_an_arc_leaves_room_for_the_centripetal_acceleration():
     assert 28.5 < acceleration.max() <= 30.0
 
 
+@pytest.mark.slow
 @law
 @given(drawings, limits)
 def test_the_speed_is_the_derivative_of_the_arc_length(strokes, limit):
@@ -166,6 +175,7 @@ def test_a_stroke_slows_down_for_a_tight_arc_only():
     assert speed[(x > 100.1) & (y < 2.9)].max() <= math.sqrt(30 * 3) * (1 + 1e-9)
 
 
+@pytest.mark.slow
 @law
 @given(drawings, st.integers(0, 359), st.integers(-89, 89))
 def test_turning_the_plane_turns_the_drawing(strokes, azimuth, tilt):

@@ -115,6 +115,7 @@ def test_a_reference_holds_the_target_now_and_ahead(section):
     assert (reference.normal is None) == (reference.ahead_normal is None) == (section["kind"] == "strokes")
 
 
+@pytest.mark.slow
 def test_reading_settings_needs_no_numerical_library():
     heavy = "{'numpy', 'scipy', 'numba'} & set(sys.modules)"
     program = f"import sys, tcrctl.trajectory.settings; print({heavy} or 'none')"

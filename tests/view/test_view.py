@@ -219,6 +219,7 @@ def test_without_the_extra_the_error_says_how_to_get_it(log, tmp_path, monkeypat
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.slow
 def test_the_command_prints_its_address_and_ends_with_ctrl_c(log):
     command = [sys.executable, "-m", "tcrctl.cli.app", "play", str(log), "--port", "0"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -239,6 +240,7 @@ def short():
     return prepare(short_spec())
 
 
+@pytest.mark.slow
 def test_a_live_view_shows_what_the_log_holds(short, tmp_path):
     with LiveView("letter_t", port=0) as live, ViewerClient(live.url) as client:
         client.subscribe(count=len(TOPICS) + 2)
@@ -253,11 +255,13 @@ def test_a_live_view_shows_what_the_log_holds(short, tmp_path):
     assert live.failure is None
 
 
+@pytest.mark.slow
 def test_the_command_shows_a_run_while_it_runs(tmp_path, capsys):
     assert main(["run", "letter_t", *arguments(), "--view", "--view-port", "0", "--out", str(tmp_path)]) == 0
     assert "live view at ws://127.0.0.1:" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_view_that_fails_does_not_end_the_run(short, tmp_path, monkeypatch):
     with LiveView("letter_t", port=0) as live:
         calls = []

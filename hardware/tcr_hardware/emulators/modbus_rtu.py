@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import select
 import struct
-import termios
 import threading
 import time
-import tty
+from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 from tcr_hardware.emulators.modbus_server import READ_WRITE, WRITE_MANY, ModbusServer
 from tcr_hardware.errors import HardwareError
@@ -112,10 +112,27 @@ def crc(data: bytes) -> bytes:
     return struct.pack("<H", remainder)
 
 
+def _terminals() -> tuple[Callable[[int], Any], type[Exception]]:
+    """What makes a terminal raw, and the error it raises; looked for only here, because Windows has neither.
+
+    Raises:
+        HardwareError: This system has no terminals of this kind.
+    """
+    try:
+        import termios
+        import tty
+    except ImportError:
+        raise HardwareError(
+            "a serial line can be emulated on Linux and macOS only; Modbus TCP everywhere"
+        ) from None
+    return tty.setraw, termios.error
+
+
 def _pseudo_terminal() -> tuple[int, int]:
     """Both ends of a raw pseudo-terminal: ours, and the client's, kept open so that clients may come and go."""
+    make_raw, _ = _terminals()
     ours, theirs = os.openpty()
-    tty.setraw(theirs)
+    make_raw(theirs)
     return ours, theirs
 
 
@@ -125,9 +142,10 @@ def _open(device: str) -> int:
     Raises:
         HardwareError: It cannot be opened.
     """
+    make_raw, terminal_error = _terminals()
     try:
         descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY)
-        tty.setraw(descriptor)
-    except (OSError, termios.error) as error:
+        make_raw(descriptor)
+    except (OSError, terminal_error) as error:
         raise HardwareError(f"cannot serve Modbus RTU on {device}: {error}") from error
     return descriptor

@@ -230,6 +230,7 @@ events = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.lists(events, max_size=15), st.floats(200, 120_000))
 def test_whatever_the_host_does_no_set_point_leaves_its_stroke_or_breaks_the_speed_limit(script, vmax):

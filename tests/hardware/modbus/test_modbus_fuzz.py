@@ -68,6 +68,7 @@ def test_no_answer_of_a_plc_raises_anything_but_our_errors(link, exchange):
     print(f"{sum(seen.values())} mutants over {link}, {exchange}: {seen}, slowest {1e3 * slowest:.1f} ms")
 
 
+@pytest.mark.slow
 def test_mutated_answers_leave_no_memory_behind(caplog):
     caplog.set_level(logging.CRITICAL + 1, logger="pymodbus")  # pytest keeps every message
     wire = MutatingWire(PlcEmulator(), 1, serial=False)

@@ -107,6 +107,7 @@ def test_opening_finds_the_limits_and_writes_nothing(plc, wire):
     assert plc.read(0, 16) == [0] * 16
 
 
+@pytest.mark.slow
 def test_an_armed_robot_goes_where_it_is_sent_and_says_so(plc, wire, exchange):
     with PlcBus(settings_for(plc, wire, exchange=exchange)) as bus:
         status = settle(bus, STILL, Control.RUN, exchanges=3)
@@ -237,6 +238,7 @@ def test_an_exception_answer_is_an_error_with_its_code_and_is_not_repeated(bus, 
     bus.exchange(STILL, Control.RUN, SPEED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["silence", "corrupt", "truncate", "wrong_echo"])
 def test_a_single_bad_answer_is_survived_by_one_retry_of_the_same_set(plc, wire, exchange, fault):
     with PlcBus(settings_for(plc, wire, exchange=exchange, timeout_s=0.2)) as bus:
@@ -270,6 +272,7 @@ def test_without_retries_one_silence_is_an_error(plc, wire):
         assert bus.statistics.timeouts == 1
 
 
+@pytest.mark.slow
 def test_a_late_answer_never_passes_for_the_next_one(plc, wire, exchange):
     with PlcBus(settings_for(plc, wire, exchange=exchange, timeout_s=0.15, retries=0)) as bus:
         settle(bus, STILL, ON, exchanges=3)
@@ -407,6 +410,7 @@ def test_the_estop_is_seen_and_latched(bus, plc):
     assert Status.FAULT in status
 
 
+@pytest.mark.slow
 def test_a_power_cycle_disables_and_the_bus_goes_on_with_the_new_counters(bus, plc):
     settle(bus, STILL, ON, exchanges=40)
     plc.faults.set("restart")
@@ -465,6 +469,7 @@ def test_a_serial_line_with_a_baud_rate_answers_no_faster_than_its_wire(plc):
         assert status.round_trip_s >= 0.0184
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", [1, 3, 12])
 def test_a_robot_may_have_any_number_of_axes(axes):
     rows = register_map(axes)

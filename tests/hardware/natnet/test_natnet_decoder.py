@@ -173,6 +173,7 @@ def as_read(frame):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(seed=st.integers(0, 2**32 - 1), version=st.sampled_from(VERSIONS))
 def test_what_an_independent_encoder_writes_is_read_back_unchanged(seed, version):
@@ -207,6 +208,7 @@ def full_frame(version):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_frame_cut_off_anywhere_is_refused(version):
     payload = full_frame(version)
@@ -222,6 +224,7 @@ def test_a_frame_with_a_byte_too_many_is_refused(version):
         decode_frame(full_frame(version) + b"\0", Version(*version))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("value", [-1, -(2**31), 2**31 - 1, 70_000, 5_461, 1_001])
 def test_a_wrong_count_anywhere_costs_neither_time_nor_memory(version, value):
@@ -262,6 +265,7 @@ def worst_frames():
         yield version, b"\1\0\0\0" + none * 4 + tail + none + counted(1, channels)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("version", "payload"), list(worst_frames()))
 def test_the_worst_packet_is_refused_within_a_megabyte(version, payload):
     tracemalloc.start()
@@ -282,6 +286,7 @@ def timed(payload, version):
     return time.thread_time() - start
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(data=st.data(), version=st.sampled_from(VERSIONS))
 def test_a_mutated_packet_is_read_or_refused_and_nothing_else(data, version):

@@ -84,6 +84,7 @@ def fed(numbers, *, period=1 / 240):
     return order, [order.classify(number, 100.0 + k * period) for k, number in enumerate(numbers)]
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(random=st.randoms(use_true_random=True), loss=st.sampled_from([0.0, 0.01, 0.1, 0.5]))
 def test_whatever_the_network_does_every_frame_is_used_at_most_once_and_in_order(random, loss):
@@ -158,6 +159,7 @@ def test_numbers_missed_long_ago_are_forgotten():
 HZ = 10_000_000
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(
     offset=st.floats(-1e6, 1e6),

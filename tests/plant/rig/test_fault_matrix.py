@@ -22,6 +22,7 @@ LATE = 1.0
 WATCHDOG_MS = 400
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "phase"), suite_cells(), ids=lambda x: x if isinstance(x, str) else x.name)
 def test_a_fault_ends_the_run_safely_and_in_time(case, phase, tcr5x4):
     outcome = play(case, phase, tcr5x4, PATIENT, WATCHDOG_MS)
@@ -39,6 +40,7 @@ def test_a_fault_ends_the_run_safely_and_in_time(case, phase, tcr5x4):
         assert outcome.events == []
 
 
+@pytest.mark.slow
 def test_faults_that_do_no_harm_do_not_stop_the_run(tcr5x4):
     """One after the other in one run; a busy computer may hold it in between."""
     harmless = [case for case in CASES if case.moving == "running"]
@@ -61,6 +63,7 @@ def test_faults_that_do_no_harm_do_not_stop_the_run(tcr5x4):
     assert np.abs(np.diff(sent, axis=0)).max() <= 500
 
 
+@pytest.mark.slow
 def test_the_watchdog_catches_a_controller_that_hangs(tcr5x4):
     with Bench(tcr5x4, PATIENT, watchdog_ms=150) as bench:
         plant = bench.plant()

@@ -176,6 +176,7 @@ SIGHTS = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(st.sampled_from([State.STOPPING, State.FAULTED]), st.lists(SIGHTS, max_size=20))
 def test_nothing_that_is_seen_lets_a_stopped_robot_move_again(state, sights):
     supervisor, _ = made(state)

@@ -1,0 +1,76 @@
+"""One command for each check, in the environment that nox is installed in (docs/decisions/11-nox.md).
+
+nox -s lint types fast        # before every commit
+nox -s test -- -k replay      # what stands after -- goes to pytest
+nox -s docs bench             # draw the pictures again, print the tables of cost
+nox -s pin                    # write constraints.txt anew
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+
+import nox
+
+nox.options.default_venv_backend = "none"
+nox.options.sessions = ["lint", "types", "fast"]
+
+CONSTRAINTS = Path("constraints.txt")
+#: Benchmarks that say in a minute each whether something has become slower.
+BENCHMARKS = ("control_step", "plant_step", "log_cost", "natnet_decode")
+
+
+@nox.session
+def lint(session: nox.Session) -> None:
+    """Check style, format and the direction of imports."""
+    session.run("python", "-m", "ruff", "check", ".")
+    session.run("python", "-m", "ruff", "format", "--check", ".")
+    session.run("lint-imports")
+
+
+@nox.session
+def types(session: nox.Session) -> None:
+    """Check types."""
+    session.run("python", "-m", "mypy")
+
+
+@nox.session
+def fast(session: nox.Session) -> None:
+    """Run the tests that take less than a second each."""
+    session.run("python", "-m", "pytest", "-m", "fast", *session.posargs)
+
+
+@nox.session
+def test(session: nox.Session) -> None:
+    """Run all tests."""
+    session.run("python", "-m", "pytest", *session.posargs)
+
+
+@nox.session
+def docs(session: nox.Session) -> None:
+    """Check the links of the documents and draw their pictures again."""
+    session.run("python", "-m", "pytest", "-n", "0", "tests/test_documents.py")
+    with tempfile.TemporaryDirectory() as folder:
+        session.run("tcrctl", "run", "letter_t", "--out", folder)
+        (log,) = Path(folder).rglob("log.mcap")
+        session.run("python", "docs/draw_letter.py", str(log), "docs/letter_t.png")
+    session.run("python", "docs/draw_control.py")
+
+
+@nox.session
+def bench(session: nox.Session) -> None:
+    """Print what a step of control, plant, log and cameras costs."""
+    for name in BENCHMARKS:
+        session.run("python", f"benchmarks/{name}.py")
+
+
+@nox.session(venv_backend="venv")
+def pin(session: nox.Session) -> None:
+    """Install everything in its newest version into a fresh environment, and write down what that was."""
+    session.install(".[dev]")
+    versions = session.run("python", "-m", "pip", "freeze", silent=True)
+    heading = CONSTRAINTS.read_text().splitlines()[0]
+    kept = [line for line in str(versions).splitlines() if re.match(r"[\w.-]+==", line)]
+    CONSTRAINTS.write_text("\n".join([heading, *kept]) + "\n")
