@@ -87,8 +87,8 @@ class LiteralIoc:
         dynamics.lengths_before(
             robot.model, estimate.q, v, estimate.drive, self._speed, 0.5 * h, s, self._work
         )
-        own = (array.copy() for array in (s.nodal, s.bar_before, s.cable_before))
-        return q0, Load(inertia, 2.0 / h, *own, None)
+        nodal, bars, cables = (array.copy() for array in (s.nodal, s.bar_before, s.cable_before))
+        return q0, Load(inertia, 2.0 / h, nodal, bars, cables, None)
 
     def _linearise(self, q: Array, drive: Array, load: Load, speed: Array) -> tuple[Array, Prediction]:
         """Newton step (12 n_modules,) at the present input, and the outputs as (31)."""

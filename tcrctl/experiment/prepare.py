@@ -17,15 +17,15 @@ from tcrctl.estimator.exact import State
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.experiment.metrics import Metrics
-from tcrctl.experiment.plant_robot import robot_of_plant
+from tcrctl.experiment.plant_robot import description_of_plant
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, with_draws
 from tcrctl.loop.loop import run_loop, step_count
 from tcrctl.loop.pacing import Unpaced
 from tcrctl.loop.safety import SafetyLimits
 from tcrctl.plant.plant import Plant, RunnablePlant
+from tcrctl.plant.realistic import rehearsal_plant
 from tcrctl.plant.rig.bench import build_rig
 from tcrctl.plant.rig.session import Session
-from tcrctl.plant.realistic import rehearsal_plant
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
@@ -111,8 +111,10 @@ def _simulated(experiment: Experiment, session: Session) -> tuple[RunnablePlant,
     spec = experiment.spec
     if not isinstance(spec.plant, SimulatedSettings):
         raise InputError(f"plant.kind is {spec.plant.kind}, not simulated")
-    own = robot_of_plant(spec.plant, experiment.loaded, experiment.robot, spec.seed)
-    plant = SimulatedPlant(spec.plant, own, experiment.period, spec.seed)
+    loaded, robot = experiment.loaded, experiment.robot
+    own = description_of_plant(spec.plant, loaded.robot, loaded.plant_robot, spec.seed, robot)
+    robot = robot if own is None else build_robot(own)
+    plant = SimulatedPlant(spec.plant, robot, experiment.period, spec.seed)
     return plant, plant.state
 
 
@@ -242,7 +244,9 @@ def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple
 
 def _rehearse(experiment: Experiment) -> None:
     """Run a few steps with parts of its own, in simulation, so that nothing of the run itself is touched."""
-    plant = SimulatedPlant(rehearsal_plant(experiment.spec.plant), experiment.robot, experiment.period, experiment.spec.seed)
+    plant = SimulatedPlant(
+        rehearsal_plant(experiment.spec.plant), experiment.robot, experiment.period, experiment.spec.seed
+    )
     parts, metrics = build_parts(experiment, plant, plant.state), Metrics(WARM_UP_STEPS, paced=False)
     task = make_task(experiment)
 

@@ -24,9 +24,8 @@ from tcrctl.experiment.criterion import CriterionText
 from tcrctl.experiment.plant_robot import plant_robot
 from tcrctl.experiment.summary import TASK, UNITS
 from tcrctl.plant.realistic import as_drawn
-from tcrctl.plant.reality_settings import list_misfits
 from tcrctl.plant.rig.file import LoadedRig, load_rig
-from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings, rings_named
+from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings, list_misfits, rings_named
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.sections import Name
 from tcrctl.task.settings import TaskSettings
@@ -234,7 +233,7 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     spec, robot, robot_path = _validated(document, path.parent, problems)
     document.refuse(misfits(spec, robot))
     rig = load_rig(spec.plant.rig, robot, path.parent) if isinstance(spec.plant, RigSettings) else None
-    own = plant_robot(document, spec, robot, robot_path)
+    own = plant_robot(document, spec.plant, robot, robot_path)
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, own, notes)
 
 

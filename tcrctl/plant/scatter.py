@@ -1,7 +1,7 @@
 """A robot as it came out of the workshop: no two modules, springs and holes are alike.
 
-What is drawn is written into the description of a robot (``modules.each``, ``springs.each``, ``through``, ``base``), so
-that it can be read, logged and used again as a robot file. Cables keep the rest lengths of the robot as designed.
+What is drawn is written into the description of a robot (``modules.each``, ``springs.each``, ``through``,
+``base``), so that it can be read, logged and used again as a robot file. Rest lengths are kept.
 """
 
 from __future__ import annotations
@@ -51,7 +51,10 @@ def _factor(random: np.random.Generator, deviation: float) -> float:
 
 
 def _modules(
-    robot: RobotDescription, scatter: ScatterSettings, masses: np.random.Generator, geometry: np.random.Generator
+    robot: RobotDescription,
+    scatter: ScatterSettings,
+    masses: np.random.Generator,
+    geometry: np.random.Generator,
 ) -> tuple[ModuleDifference, ...]:
     """Mass and node places of every module."""
     given = {entry.module: entry for entry in robot.modules.each}

@@ -9,9 +9,19 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from tcrctl.config.keys import Keys
+from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.settings import NotNegative, OrOff, Positive, Settings, Vector, quantity
-from tcrctl.plant.reality_settings import RealitySettings
+from tcrctl.plant.reality_settings import (
+    CableEffects,
+    CameraSettings,
+    DriveSettings,
+    HysteresisSettings,
+    Level,
+    OwnRobot,
+    ScatterSettings,
+    Seed,
+)
+from tcrctl.robot.sections import FrictionSettings
 
 
 class Mismatch(Settings):
@@ -65,7 +75,7 @@ class DropoutSettings(Settings):
     duration_s: Positive = quantity("s", "how long it lasts")
 
 
-class SimulatedSettings(RealitySettings):
+class SimulatedSettings(Settings):
     """The robot's equations of motion, integrated by the generalized-alpha method."""
 
     kind: Literal["simulated"]
@@ -85,6 +95,24 @@ class SimulatedSettings(RealitySettings):
     )
     pushes: tuple[PushSettings, ...] = Field(default=(), description="forces from outside")
     dropouts: tuple[DropoutSettings, ...] = Field(default=(), description="markers that are not seen")
+    realistic: Level = Field(
+        default="off",
+        description="draws all sections below that are not given, for a robot of this kind, by realistic_seed",
+    )
+    realistic_seed: Seed | None = Field(default=None, description="seed of it; that of the run if left out")
+    robot: OwnRobot | None = Field(
+        default=None,
+        description="robot of the plant, if it is not the one that the controller knows: name or path of a "
+        "robot file, or a map of what is different",
+    )
+    scatter: OrOff[ScatterSettings] = Field(default=None, description="unlike parts, or off")
+    friction: OrOff[FrictionSettings] = Field(
+        default=None, description="friction in the cable holes; off: what the robot's file says"
+    )
+    drives: OrOff[DriveSettings] = Field(default=None, description="imperfect drives, or off")
+    cables: OrOff[CableEffects] = Field(default=None, description="imperfect cables, or off")
+    springs_hysteresis: OrOff[HysteresisSettings] = Field(default=None, description="loss of springs, or off")
+    cameras: OrOff[CameraSettings] = Field(default=None, description="imperfect cameras, or off")
 
 
 class RigSettings(Settings):
@@ -112,3 +140,25 @@ def rings_named(settings: PlantSettings) -> Iterator[tuple[Keys, int]]:
     for i, dropout in enumerate(settings.dropouts):
         for j, ring in enumerate(dropout.rings):
             yield ("dropouts", i, "rings", j), ring
+
+
+def list_misfits(settings: SimulatedSettings, cables: tuple[str, ...], robot: str) -> Iterator[Finding]:
+    """Yield path within the section and message of every list that is not one entry per cable.
+
+    Args:
+        settings: Of the plant.
+        cables: Names of the robot's cables.
+        robot: Its name.
+    """
+    lists: list[tuple[Keys, Any]] = []
+    if settings.friction is not None:
+        lists.append((("friction", "coefficient"), settings.friction.coefficient))
+    if settings.drives is not None:
+        lists.append((("drives", "radius_error"), settings.drives.radius_error))
+        lists.append((("drives", "zero_error_mm"), settings.drives.zero_error_mm))
+    if settings.cables is not None:
+        lists.append((("cables", "initial_tension"), settings.cables.initial_tension))
+    for keys, value in lists:
+        if isinstance(value, tuple) and len(value) != len(cables):
+            has = f"{robot} has {len(cables)} cables, {', '.join(cables)}"
+            yield keys, f"{has}; there are {len(value)} values"
