@@ -10,7 +10,6 @@ from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import dynamics
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, assemble, make_workspace
-from tcrctl.robot.equilibrium import equilibrium
 from tcrctl.robot.robot import hole_friction
 from tcrctl.robot.sections import FrictionSettings
 from tcrctl.signals import Command
@@ -44,15 +43,29 @@ def settled(robot, mu, step_ms=2.5):
     return plant
 
 
-def test_without_a_coefficient_the_plant_is_that_without_friction(tcr5x4):
-    """Other equations for the same robot: the dampers of the stretches are in series instead of one."""
-    plain, rubbing = build(tcr5x4, None), build(tcr5x4, 0.0)
+def test_without_a_coefficient_the_plant_is_that_without_friction():
+    """Other equations of the same robot; with cables that do not damp they agree to rounding."""
+    robot = mechanics.altered("tcr5x4", "cables.damping_n_s_m=0")
+    plain, rubbing = build(robot, None), build(robot, 0.0)
     for k in range(30):
         for plant in (plain, rubbing):
             write(plant, 0.04 * np.cos(0.3 * k + np.arange(4)))
-        np.testing.assert_allclose(rubbing.truth().q, plain.truth().q, rtol=0, atol=1e-7)
-        np.testing.assert_allclose(rubbing.truth().tension, plain.truth().tension, rtol=0, atol=1e-4)
-    assert np.abs(plain.truth().q - tcr5x4.rest.q).max() > 5e-3
+        np.testing.assert_allclose(rubbing.truth().q, plain.truth().q, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(rubbing.truth().tension, plain.truth().tension, rtol=0, atol=1e-6)
+    assert np.abs(plain.truth().q - robot.rest.q).max() > 5e-3
+
+
+def test_the_damper_of_stretches_in_series_is_that_of_the_cable(tcr5x4):
+    """Its rule is of first order, that of a cable without friction of second."""
+    errors = []
+    for step_ms in (5.0, 2.5, 1.25):
+        plain, rubbing, worst = build(tcr5x4, None, step_ms), build(tcr5x4, 0.0, step_ms), 0.0
+        for k in range(10):
+            for plant in (plain, rubbing):
+                write(plant, 0.04 * np.cos(0.3 * k + np.arange(4)))
+            worst = max(worst, np.abs(rubbing.truth().q - plain.truth().q).max())
+        errors.append(worst)
+    assert errors[2] < errors[0] < 3e-4
 
 
 def test_a_robot_that_sticks_stays_for_a_minute(tcr5x4):
@@ -61,21 +74,21 @@ def test_a_robot_that_sticks_stays_for_a_minute(tcr5x4):
     material, shape = slip.rest.copy(), plant.truth().q
     still(plant, 60.0)
     assert np.array_equal(slip.rest, material)
-    assert np.abs(plant.truth().q - shape).max() < 1e-9
+    assert np.abs(plant.truth().q - shape).max() < 1e-7
 
 
 def test_pushed_and_let_go_a_robot_with_friction_stays_beside_its_equilibrium(tcr5x4):
-    push = {"ring": 5, "force_n": [0.3, 0.0, 0.0], "start_s": 0.0, "duration_s": 2.0}
+    push = {"ring": 5, "force_n": (0.3, 0.0, 0.0), "start_s": 0.0, "duration_s": 2.0}
     beside = {}
-    for mu in (None, 0.1, 0.3):
+    for mu, seconds in ((None, 40.0), (0.1, 12.0), (0.3, 12.0)):
         plant = build(tcr5x4, mu, pushes=(push,))
-        still(plant, 12.0)
+        still(plant, seconds)
         _, v = plant.state()
         beside[mu] = np.linalg.norm(plant.truth().position - tcr5x4.rest_position)
-        if mu:
-            assert np.abs(v).max() < 1e-6
-    assert beside[None] < 0.2 * beside[0.1]
-    assert 1e-4 < beside[0.1]
+        assert np.abs(v).max() < (1e-3 if mu is None else 1e-4)
+    assert beside[None] < 1e-4
+    assert beside[0.1] > 1e-3
+    assert beside[0.3] > 1e-3
 
 
 def rubbing_load(robot, q, drive, mu):
@@ -139,24 +152,17 @@ def test_the_loop_has_an_area_that_does_not_depend_on_the_step(tcr5x4):
 
 
 def test_the_motion_converges_with_the_step(tcr5x4):
-    """Distance to a much finer step falls with the step, on a way on which holes stick, slide and turn."""
+    """Of first order, on a way on which holes stick, slide and turn."""
     ends = {}
-    for step_ms in (10.0, 5.0, 2.5, 0.625):
+    for step_ms in (5.0, 2.5, 1.25, 0.3125):
         plant, way = build(tcr5x4, 0.1, step_ms), []
         for k in range(20):
             write(plant, 0.05 * np.cos(0.4 * k + np.arange(4)))
             way.append(plant.truth().q)
         ends[step_ms] = np.array(way)
-    errors = [np.abs(ends[h] - ends[0.625]).max() for h in (10.0, 5.0, 2.5)]
-    assert errors[0] > errors[1] > errors[2]
-    assert errors[2] < 0.35 * errors[0]
-    assert errors[2] < 5e-4
-
-
-def test_a_stuck_cable_holds_the_shape_that_a_free_one_would_not(tcr5x4):
-    """Statics with friction: the end lies between where it was and the equilibrium, never beyond."""
-    plant = settled(tcr5x4, 0.2)
-    drive = plant.read().drive
-    free = equilibrium(tcr5x4.model, drive, tcr5x4.weight, plant.truth().q)
-    there = plant.truth().q - free.q
-    assert 1e-5 < np.abs(there).max() < 0.02
+    finest = ends.pop(0.3125)
+    errors = [np.sqrt(np.mean((way - finest) ** 2)) for way in ends.values()]
+    assert errors[1] < 0.7 * errors[0]
+    assert errors[2] < 0.7 * errors[1]
+    assert errors[2] < 1e-4
+    assert np.abs(finest - tcr5x4.rest.q).max() > 0.03

@@ -70,11 +70,17 @@ def test_another_file_is_looked_for_beside_the_experiment(tmp_path):
         ("plant.robot=tcr600", "has 11 modules; tcr700 has 13"),
         ("plant.robot=tcr600", "has cables c1, c2, c3; tcr700 has c1, c2, c3, c4, c5, c6"),
         ("plant.robot=tcr70", "tcr70"),
-        ("plant.robot={springs: {youngs_modulus_mpa: -1}}", "plant.robot.springs.youngs_modulus_mpa: must be > 0"),
+        (
+            "plant.robot={springs: {youngs_modulus_mpa: -1}}",
+            "plant.robot.springs.youngs_modulus_mpa: must be > 0",
+        ),
         ("plant.robot.sprigs.youngs_modulus_mpa=1", "unknown key; did you mean springs?"),
         ("plant.robot={tip: {ring: 12}}", "has its tip at ring 12; tcr700 at ring 13"),
         ("plant.robot=[1]", "must be"),
-        ("plant.cables.initial_tension=[1, 1]", "tcr700 has 6 cables, c1, c2, c3, c4, c5, c6; there are 2 values"),
+        (
+            "plant.cables.initial_tension=[1, 1]",
+            "tcr700 has 6 cables, c1, c2, c3, c4, c5, c6; there are 2 values",
+        ),
         ("plant.drives.zero_error_mm=[1, 1]", "there are 2 values"),
         ("plant.friction.coefficient=[0.1, 0.1, 0.1]", "there are 3 values"),
         ("plant.drives.radius_error=0.5", "must be < 0.5"),
@@ -103,7 +109,9 @@ def test_every_cable_starts_with_its_tension_times_the_factor(tcr5x4, factor):
     assert np.all(np.sign(change) == np.sign(1.0 - factor))
     mixed = plant(cables={"initial_tension": factor}, mismatch={"springs_youngs_modulus": 0.7})
     soft = moving_robot(plant(mismatch={"springs_youngs_modulus": 0.7}), tcr5x4)
-    np.testing.assert_allclose(moving_robot(mixed, tcr5x4).rest.tension, factor * soft.rest.tension, rtol=1e-5)
+    np.testing.assert_allclose(
+        moving_robot(mixed, tcr5x4).rest.tension, factor * soft.rest.tension, rtol=1e-5
+    )
 
 
 def test_factors_of_one_change_no_bit(tcr5x4):

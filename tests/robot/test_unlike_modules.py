@@ -32,7 +32,10 @@ def test_the_defaults_of_the_new_sections_change_no_bit():
 
 
 def test_a_module_that_is_not_like_the_others_has_its_own_mass_rods_and_place():
-    plain, other = model(), model("modules.each=[{module: 3, mass_g: 12, youngs_modulus_mpa: 5000, pitch_mm: 60}]")
+    plain, other = (
+        model(),
+        model("modules.each=[{module: 3, mass_g: 12, youngs_modulus_mpa: 5000, pitch_mm: 60}]"),
+    )
     assert np.flatnonzero((plain.mass != other.mass).any(axis=(1, 2))).tolist() == [2]
     joints = 3 * 0.8e-3
     assert other.mass[2, 0::3, 0::3].sum() - 12e-3 == pytest.approx(plain.mass[2, 0::3, 0::3].sum() - 10e-3)
@@ -50,7 +53,9 @@ def test_a_module_that_is_not_like_the_others_has_its_own_mass_rods_and_place():
 def test_an_offset_moves_one_node_and_stretches_nothing():
     given = "modules.each=[{module: 2, offsets_mm: {n2: [1, 0, -0.5]}}]"
     robot = load_robot("tcr5x4", overrides=(given,))
-    moved = np.flatnonzero(np.any((undeformed(robot) - undeformed(load_robot("tcr5x4"))).reshape(-1, 3), axis=1))
+    moved = np.flatnonzero(
+        np.any((undeformed(robot) - undeformed(load_robot("tcr5x4"))).reshape(-1, 3), axis=1)
+    )
     assert moved.tolist() == [9]
     built = build_model(robot, REST)
     ends = undeformed(robot).reshape(-1, 3)[built.bar_nodes[: RIGID_BARS * 5]]
@@ -68,7 +73,10 @@ def test_a_spring_that_is_not_like_the_others_is_found_by_its_nodes_in_any_order
 
 def test_a_tilted_robot_is_the_same_robot_turned_where_nothing_pulls_it_down():
     free = "gravity_m_s2=[0, 0, 0]"
-    straight, tilted = mechanics.altered("tcr5x4", free), mechanics.altered("tcr5x4", free, "base.tilt_deg=[2, -3]")
+    straight, tilted = (
+        mechanics.altered("tcr5x4", free),
+        mechanics.altered("tcr5x4", free, "base.tilt_deg=[2, -3]"),
+    )
     x, y = np.radians([2.0, -3.0])
     turn = mechanics.turned(np.array([0.0, y, 0.0])) @ mechanics.turned(np.array([x, 0.0, 0.0]))
     np.testing.assert_allclose(
@@ -83,9 +91,7 @@ def test_friction_in_a_robot_file_is_known_hole_by_hole(tcr5x4):
         "tcr5x4", "friction={coefficient: [0.1, 0.2, 0.3, 0.4], least_wrap_deg: 3, drag_n: 0.01}"
     )
     assert robot.holes.shape == (24, 3)
-    np.testing.assert_allclose(
-        robot.holes[:, rubbing_cable.COEFFICIENT], np.repeat([0.1, 0.2, 0.3, 0.4], 6)
-    )
+    np.testing.assert_allclose(robot.holes[:, rubbing_cable.COEFFICIENT], np.repeat([0.1, 0.2, 0.3, 0.4], 6))
     np.testing.assert_allclose(robot.holes[:, rubbing_cable.LEAST_WRAP], np.radians(3.0))
     np.testing.assert_allclose(robot.holes[:, rubbing_cable.DRAG], 0.01)
 
