@@ -1,8 +1,8 @@
 """Cost of one step of the simulated tcr700 while its drives follow a moving reference.
 
-    python benchmarks/plant_step.py [--seconds 5] [--step-ms 1]
+    python benchmarks/plant_step.py [--seconds 5] [--step-ms 1] [--friction 0.1]
 
-The drives swing by 20 mm, out of phase, once in 5 s. Also compared: the structured solve of one Newton step (factor
+The drives swing by 20 mm, out of phase, once in 5 s; without and with friction in the cable holes. Also compared: the structured solve of one Newton step (factor
 K, couple the cables, solve) with a dense solve by numpy of the same matrix.
 """
 
@@ -25,7 +25,8 @@ from tcrctl.robot import dynamics, linear
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.equations import FORCE, Load, assemble, make_workspace
 from tcrctl.robot.module import FIXED
-from tcrctl.robot.robot import Robot, build_robot
+from tcrctl.robot.robot import Robot, build_robot, hole_friction
+from tcrctl.robot.sections import FrictionSettings
 from tcrctl.signals import Array
 
 RHO = 0.8
@@ -39,11 +40,14 @@ def speeds(t: float, m: int) -> Array:
     return ease * REACH * rate * np.cos(rate * t + np.arange(m) * np.pi / 3.0)
 
 
-def run(robot: Robot, seconds: float, step: float) -> tuple[Array, Array]:
+def run(robot: Robot, seconds: float, step: float, friction: float | None = None) -> tuple[Array, Array]:
     """Wall time of every step [us] and its Newton iterations."""
-    model, m = robot.model, robot.n_cables
-    state = dynamics.rest_state(robot.rest.q, np.zeros(m))
-    work, scratch = make_workspace(model), dynamics.make_scratch(model)
+    model, m, slip = robot.model, robot.n_cables, None
+    if friction is not None:
+        holes = hole_friction(FrictionSettings(coefficient=friction), model.first_hole)
+        slip = dynamics.unworn(model, robot.rest.q, np.zeros(m), robot.rest.tension, holes)
+    state = dynamics.rest_state(robot.rest.q, np.zeros(m), slip)
+    work, scratch = make_workspace(model, rubbing=slip is not None), dynamics.make_scratch(model)
     times, iterations, rule = [], [], dynamics.Rule(step, RHO)
     dynamics.advance(model, state, np.zeros(m), step, rule, robot.weight, work, scratch)  # compile
     for k in range(round(seconds / step)):
@@ -62,7 +66,7 @@ def solves(robot: Robot, step: float, repeats: int = 300) -> tuple[float, float,
     model, m = robot.model, robot.n_cables
     nodal = np.zeros((4, robot.rest.q.size))
     nodal[FORCE] = robot.weight
-    load = Load(4.0 / step**2, 2.0 / step, nodal, np.zeros(len(model.bars)), np.zeros(m))
+    load = Load(4.0 / step**2, 2.0 / step, nodal, np.zeros(len(model.bars)), np.zeros(m), None)
     ws = make_workspace(model)
     assemble(model, robot.rest.q, np.zeros(m), load, ws, np.bool_(True))
     G = ws.G[:, 3 * FIXED :]
@@ -84,6 +88,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--step-ms", type=float, default=1.0)
+    parser.add_argument("--friction", type=float, default=0.1)
     given = parser.parse_args()
     step = given.step_ms / 1000.0
     robot = build_robot(load_robot("tcr700"))
@@ -98,6 +103,10 @@ def main() -> None:
     table.add_row("simulated time / wall time", f"{1e6 * step * times.size / times.sum():.1f}", "1")
     table.add_row("Newton iterations, mean", f"{iterations.mean():.2f}", "1")
     table.add_row("Newton iterations, max", f"{iterations.max():d}", "1")
+    rubbing, rubbing_iterations = run(robot, given.seconds, step, given.friction)
+    table.add_row(f"step p50 with friction {given.friction:g}", f"{np.median(rubbing):.1f}", "us")
+    table.add_row("with / without friction", f"{np.median(rubbing) / np.median(times):.2f}", "1")
+    table.add_row("Newton iterations with friction, mean", f"{rubbing_iterations.mean():.2f}", "1")
     table.add_row("structured solve", f"{structured:.1f}", "us")
     table.add_row("dense solve (numpy)", f"{dense:.1f}", "us")
     table.add_row("dense / structured", f"{dense / structured:.1f}", "1")

@@ -80,7 +80,9 @@ class Dither:
         if s is None or self._expected is None:
             return
         self._errors[self._step % self._errors.shape[0]] = position - self._expected
-        size = float(np.linalg.norm(np.mean(self._errors, axis=0)))  # over a whole wave: without its own trace
+        size = float(
+            np.linalg.norm(np.mean(self._errors, axis=0))
+        )  # over a whole wave: without its own trace
         self.innovation += self._blend * (min(size, s.outlier_mm / 1e3) - self.innovation)
         excess = self.innovation - s.threshold_mm / 1e3
         rate = s.growth_1_s * excess if excess > 0.0 else -self.amplitude / s.release_s
@@ -97,7 +99,9 @@ class Dither:
             return 0.0
         self._step += 1
         up = 1.0 if (self._step // self._half_wave) % 2 == 0 else -1.0
-        ramp = 2.0 * self.amplitude / self._half_wave  # per period; halfway at first, so that the mean is zero
+        ramp = (
+            2.0 * self.amplitude / self._half_wave
+        )  # per period; halfway at first, so that the mean is zero
         wanted = np.clip(self._place + up * ramp * self._signs, -self.amplitude, self.amplitude)
         moved = wanted - self._place
         self._place = wanted

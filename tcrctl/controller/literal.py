@@ -87,8 +87,8 @@ class LiteralIoc:
         s.nodal[Q_FREE] = q0 - robot.model.damping * x.v / inertia
         s.nodal[FORCE] = robot.weight
         dynamics.lengths_before(robot.model, x.q, x.v, x.drive, at.previous, 0.5 * period, s, self._work)
-        own = (array.copy() for array in (s.nodal, s.bar_before, s.cable_before))
-        return q0, Load(inertia, 2.0 / period, *own, None)
+        nodal, bars, cables = (array.copy() for array in (s.nodal, s.bar_before, s.cable_before))
+        return q0, Load(inertia, 2.0 / period, nodal, bars, cables, None)
 
     def _linearise(self, q: Array, drive: Array, load: Load, speed: Array) -> tuple[Array, Prediction]:
         """Newton step (12 n_modules,) at the present input, and the outputs as (31)."""

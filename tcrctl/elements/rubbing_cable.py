@@ -1,16 +1,16 @@
 """A cable that rubs in its holes: capstan law with real sticking, in the form of one convex problem per step.
 
-The cable is a chain of stretches: stretch h ends at hole h (stretch 0 is the lead, from the actuator to the base ring),
-and material may slip through every hole but the last, which is the anchor. With the elongation e_h of a stretch at
-slips that have not moved, and the slips s_h of one time step, the incremental potential of a cable is
+The cable is a chain of stretches: stretch h ends at hole h (stretch 0 is the lead, from the actuator to the base
+ring), and material may slip through every hole but the last, which is the anchor. With the elongation e_h of a
+stretch at slips that have not moved, and the slips s_h of one time step, the incremental potential of a cable is
 
-    min_s  Σ_h k_h/2 (e_h + s_h - s_(h-1))₊²  +  Σ_h F_h |s_h|,        F_h = min(T_h, T_(h+1)) (exp(μ θ_h) - 1) + drag
+    min_s  Σ_h k_h/2 (e_h + s_h - s_(h-1))₊²  +  Σ_h F_h |s_h|,     F_h = min(T_h, T_(h+1)) (exp(μ θ_h) - 1) + drag
 
 F_h is lagged: it belongs to the tensions T and wrap angles θ of the last step, which makes the problem convex, and
-dissipation F_h |s_h| never negative. Its dual is a separable quadratic in the tensions under |T_h - T_(h+1)| <= F_h,
-T >= 0, solved exactly by one pass along the chain (dynamic programming on piecewise linear derivatives): holes whose
-bound is not active *stick*, s_h = 0 to the last bit. Stretches between sticking holes form groups whose tensions move
-together, in series: 1 / k = Σ 1 / k_h. Sources: capstan law [SC26]; the dual [CR05].
+dissipation F_h |s_h| never negative. Its dual is a separable quadratic in the tensions under
+|T_h - T_(h+1)| <= F_h, T >= 0, solved exactly by one pass along the chain (dynamic programming on piecewise linear
+derivatives): holes whose bound is not active *stick*, s_h = 0 to the last bit. Stretches between sticking holes
+form groups whose tensions move together, in series: 1 / k = Σ 1 / k_h. Source of the capstan law: [SC26].
 """  # fmt: skip
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ class Stretches(NamedTuple):
         stiffness: k_h with the damper of the rule [N/m].
         wanted: Tensions that the stretches would have if all holes stuck, may be negative [N].
         alone: T_h at which the chain up to h would rest if it ended there [N].
-        knots: Derivative of the chain's cost by its last tension: places [N] and values [m] of its corners (2, 4 n + 4).
+        knots: Derivative of the chain's cost by its last tension: places [N] and values [m] of its corners
+            (2, 4 n + 4).
         groups: 1 element: rows of G in use.
         columns: Memory of the columns of a solve, flat.
         small: Memory of its coupling, flat.
@@ -103,7 +104,7 @@ def _root(x: Array, y: Array, n: int, right: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _widen(x: Array, y: Array, n: int, z: float, F: float) -> int:
-    """Put a hole that holds up to F behind the chain: below its root z the function moves down by F, above up by F."""
+    """Put a hole that holds up to F behind the chain: the function moves down by F below its root z, up above."""
     i = _first_positive(y, n)
     for k in range(n - 1, i - 1, -1):
         x[k + 2], y[k + 2] = x[k] + F, y[k]
@@ -262,7 +263,7 @@ def finish(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) -> f
             before, T = moved, s.tension[k]
             free = s.length[k] - slip.rest[k]
             elongation = T / s.stiffness[k] + b * slip.before[k] / (1.0 + b)
-            sticks = T > 0.0 and T == s.alone[k]
+            sticks = T > 0.0 and s.alone[k] == T
             loose = T == 0.0 and free - before <= elongation
             moved = 0.0 if k == last or sticks or loose else before + elongation - free
             work += slip.cap[k] * abs(moved) if k < last else 0.0

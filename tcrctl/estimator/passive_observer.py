@@ -85,7 +85,9 @@ class PassiveObserver:
             return False
         still = self._load(measured)._replace(inertia=0.0, w=0.0)
         q, drive = self._q.copy(), measured.drive.copy()
-        if minimise(self._robot.model, q, drive, still, self._work, TOLERANCE, FIT_ITERATIONS, False).converged:
+        if minimise(
+            self._robot.model, q, drive, still, self._work, TOLERANCE, FIT_ITERATIONS, False
+        ).converged:
             self._q, self._drive = q, drive
             self._v = np.zeros_like(q)
         return True

@@ -25,7 +25,8 @@ class PassiveObserverSettings(Settings):
         "s", "time constant of the end pose's correction by the measured tip ring", 0.5, gt=0
     )
     fit_start: bool = Field(
-        default=True, description="begin with the model fitted to the first frame, at rest, instead of its own rest"
+        default=True,
+        description="begin with the model fitted to the first frame, at rest, instead of its own rest",
     )
     hold_blank: bool = Field(
         default=True, description="a frame without any marker repeats the last one, instead of none"

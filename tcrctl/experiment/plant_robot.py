@@ -4,39 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.strict_yaml import Document
 from tcrctl.errors import InputError
 from tcrctl.plant.own_robot import own_description
-from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
-from tcrctl.robot.robot import Robot, build_robot
-
-if TYPE_CHECKING:
-    from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
+from tcrctl.robot.robot import Robot
 
 #: Where it stands in an experiment.
 KEYS: Keys = ("plant", "robot")
 
 
 def plant_robot(
-    document: Document, spec: ExperimentSpec, robot: RobotDescription, robot_path: Path
+    document: Document, plant: PlantSettings, robot: RobotDescription, robot_path: Path
 ) -> RobotDescription | None:
     """Return the robot of the plant as designed; None if it is the controller's.
 
     Args:
         document: The experiment's file, for messages.
-        spec: The experiment.
+        plant: Its plant.
         robot: The robot that the controller knows.
         robot_path: Its file.
 
     Raises:
         SpecError: If there is no such robot, it has problems or other rings and cables.
     """
-    given = spec.plant.robot if isinstance(spec.plant, SimulatedSettings) else None
+    given = plant.robot if isinstance(plant, SimulatedSettings) else None
     if given is None:
         return None
     own = _named(document, given) if isinstance(given, str) else _changed(document, given, robot_path)
@@ -85,27 +82,25 @@ def merged(base: Any, differences: Any) -> Any:
     return {**base, **{key: merged(base.get(key), value) for key, value in differences.items()}}
 
 
-def robot_of_plant(plant: SimulatedSettings, loaded: LoadedSpec, robot: Robot, seed: int) -> Robot:
-    """Return the robot of a plant, before other material and other strings; the controller's if it has no own.
+def description_of_plant(
+    plant: SimulatedSettings,
+    robot: RobotDescription,
+    own: RobotDescription | None,
+    seed: int,
+    built: Robot | None = None,
+) -> RobotDescription | None:
+    """Return the robot of a plant with everything drawn; None if it is the controller's.
 
     Args:
-        plant: Settings, with everything drawn.
-        loaded: The files.
+        plant: Settings, as they run.
         robot: The robot that the controller knows.
-        seed: Seed of the run.
+        own: The plant's as designed, if it is another one.
+        seed: Of the run.
+        built: ``robot``, if it is built already.
 
     Raises:
-        NoEquilibriumError: If it has no stable shape.
+        NoEquilibriumError: If it has no stable shape as designed.
     """
-    own = description_of_plant(plant, loaded, robot, seed)
-    return robot if own is None else build_robot(own)
-
-
-def description_of_plant(
-    plant: SimulatedSettings, loaded: LoadedSpec, robot: Robot | None, seed: int
-) -> RobotDescription | None:
-    """Return the description of a plant's robot with everything drawn; None if it is the controller's."""
-    if loaded.plant_robot is None and plant.scatter is None:
+    if own is None and plant.scatter is None:
         return None
-    own = loaded.plant_robot or loaded.robot
-    return own_description(plant, own, robot if own is loaded.robot else None, seed)
+    return own_description(plant, own or robot, built if own is None else None, seed)

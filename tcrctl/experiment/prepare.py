@@ -17,7 +17,7 @@ from tcrctl.estimator.exact import State
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.experiment.metrics import Metrics
-from tcrctl.experiment.plant_robot import robot_of_plant
+from tcrctl.experiment.plant_robot import description_of_plant
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, with_draws
 from tcrctl.loop.loop import Parts, run_loop, step_count
 from tcrctl.loop.safety import SafetyGuard, SafetyLimits
@@ -89,8 +89,10 @@ def _simulated(
     settings: SimulatedSettings, experiment: Experiment, session: Session
 ) -> tuple[RunnablePlant, State]:
     del session
-    own = robot_of_plant(settings, experiment.loaded, experiment.robot, experiment.spec.seed)
-    plant = SimulatedPlant(settings, own, experiment.period, experiment.spec.seed)
+    loaded, spec, robot = experiment.loaded, experiment.spec, experiment.robot
+    own = description_of_plant(settings, loaded.robot, loaded.plant_robot, spec.seed, robot)
+    robot = robot if own is None else build_robot(own)
+    plant = SimulatedPlant(settings, robot, experiment.period, spec.seed)
     return plant, plant.state
 
 

@@ -14,10 +14,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from tcrctl import __version__
 from tcrctl.config import strict_yaml
+from tcrctl.experiment.plant_robot import description_of_plant
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
-from tcrctl.log.file_names import RESOLVED, RIG, ROBOT, SPEC, VERSIONS
+from tcrctl.log.file_names import CAMERAS, PLANT_ROBOT, RESOLVED, RIG, ROBOT, SPEC, VERSIONS
+from tcrctl.plant.cameras import draw_cameras
+from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.robot.module import ring_rows
 
 _PACKAGES: Final = (
     "foxglove-schemas-protobuf", "llvmlite", "mcap", "numba", "numpy", "protobuf", "pydantic", "pyyaml", "scipy",
@@ -45,8 +51,29 @@ def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str
         RESOLVED: ("application/yaml", resolved_text(spec)),
         ROBOT: ("application/yaml", strict_yaml.read(loaded.robot_path)),
         **rig,
+        **_drawn(loaded, spec),
         VERSIONS: ("application/json", json.dumps(versions(), indent=2).encode()),
     }
+
+
+def _drawn(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str, bytes]]:
+    """What a simulated plant is, as far as the experiment only says how it is drawn."""
+    files: dict[str, tuple[str, bytes]] = {}
+    if not isinstance(spec.plant, SimulatedSettings):
+        return files
+    own = description_of_plant(spec.plant, loaded.robot, loaded.plant_robot, spec.seed)
+    if own is not None:
+        files[PLANT_ROBOT] = ("application/yaml", strict_yaml.dumps(own.model_dump(mode="json")).encode())
+    if spec.plant.cameras is not None:
+        rows = ring_rows(loaded.robot.modules.count)
+        draw = draw_cameras(spec.plant.cameras, len(rows), spec.seed)
+        values = {
+            "marker_bias_mm": (1e3 * draw.bias).tolist(),
+            "frame_rotation_deg": np.degrees(draw.rotation).tolist(),
+            "frame_translation_mm": (1e3 * draw.translation).tolist(),
+        }
+        files[CAMERAS] = ("application/json", json.dumps(values, indent=2).encode())
+    return files
 
 
 def versions() -> dict[str, str]:

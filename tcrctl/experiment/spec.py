@@ -24,7 +24,6 @@ from tcrctl.experiment.criterion import CriterionText
 from tcrctl.experiment.plant_robot import plant_robot
 from tcrctl.experiment.summary import TASK, UNITS
 from tcrctl.plant.realistic import as_drawn
-from tcrctl.plant.reality_settings import list_misfits
 from tcrctl.plant.rig.file import LoadedRig, load_rig
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
@@ -158,9 +157,8 @@ def _drive_misfits(spec: ExperimentSpec, robot: RobotDescription) -> Iterator[Fi
     on_the_way = [(("trajectory", *keys), lengths) for keys, lengths in spec.trajectory.drives_named()]
     at_start = [(("plant", *keys), lengths) for keys, lengths in spec.plant.drives_named()]
     names = [route.name for route in cable_routes(robot)]
-    if isinstance(spec.plant, SimulatedSettings):
-        for path, message in list_misfits(spec.plant, tuple(names), robot.name):
-            yield ("plant", *path), message
+    for path, message in spec.plant.list_misfits(tuple(names), robot.name):
+        yield ("plant", *path), message
     for keys, lengths in (*on_the_way, *at_start):
         if len(lengths) != len(names):
             has = f"{robot.name} has {len(names)} cables, {', '.join(names)}"
@@ -221,7 +219,7 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     document.refuse(misfits(spec, robot))
     named = spec.plant.rig_file
     rig = None if named is None else load_rig(named, robot, path.parent)
-    own = plant_robot(document, spec, robot, robot_path)
+    own = plant_robot(document, spec.plant, robot, robot_path)
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, own, notes)
 
 

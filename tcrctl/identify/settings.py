@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from tcrctl.config.keys import Finding
-from tcrctl.config.settings import Settings, quantity, refuse
-from tcrctl.robot.sections import Name, Vector
+from tcrctl.config.settings import Settings, Vector, quantity, refuse
+from tcrctl.robot.sections import Name
 
 Method = Literal["pso+least-squares", "pso", "least-squares"]
 

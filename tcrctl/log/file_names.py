@@ -7,5 +7,7 @@ from typing import Final
 SPEC: Final = "spec.yaml"
 RESOLVED: Final = "spec.resolved.yaml"
 ROBOT: Final = "robot.yaml"
+PLANT_ROBOT: Final = "plant_robot.yaml"
+CAMERAS: Final = "plant_cameras.json"
 RIG: Final = "rig.yaml"
 VERSIONS: Final = "versions.json"

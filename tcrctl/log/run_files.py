@@ -4,6 +4,8 @@
 ``spec.yaml``            the experiment as it was given
 ``spec.resolved.yaml``   the same with every default and ``--set`` filled in: what ran
 ``robot.yaml``           the robot that the controller knew
+``plant_robot.yaml``     the robot of a simulated plant, with everything drawn, if it was another one
+``plant_cameras.json``   what was wrong with its cameras from beginning to end, if anything was drawn
 ``rig.yaml``             the bench, if there was one
 ``versions.json``        versions of everything that the numbers depend on
 =======================  ==========================================================================================

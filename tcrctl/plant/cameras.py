@@ -1,9 +1,9 @@
 """Cameras of the simulated plant: which markers are reported where, and how old that is.
 
-    shapes of the robot -> exposure -> markers beside their nodes -> frame that is off -> noise, outliers -> lost ones
+    shapes of the robot -> exposure -> markers beside their nodes -> frame that is off -> noise, outliers -> losses
 
 A frame that is lost is the last one again, with the time at which that was taken, as a bench reports it.
-"""
+"""  # fmt: skip
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def ring_frames(nodes: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
-class ImperfectCameras:
-    """See the module's docstring.
+class CameraDraw(NamedTuple):
+    """What is wrong with cameras from beginning to end.
 
     Attributes:
         bias: Every marker beside its node, in the axes of its ring (n_markers, 3) [m].
@@ -62,26 +62,45 @@ class ImperfectCameras:
         translation: Distance by which it is off (3,) [m].
     """
 
+    bias: Array
+    rotation: Array
+    translation: Array
+
+
+def draw_cameras(settings: CameraSettings, markers: int, seed: int) -> CameraDraw:
+    """Draw what stays; ``seed`` counts if the settings have none."""
+    fixed = np.random.default_rng([_seed(settings, seed), 0])
+    bias = 1e-3 * settings.marker_bias_mm * directions(fixed, markers)
+    axis, way = directions(fixed, 2)
+    off = settings.frame_error
+    return CameraDraw(bias, np.radians(off.rotation_deg) * axis, 1e-3 * off.translation_mm * way)
+
+
+def _seed(settings: CameraSettings, seed: int) -> int:
+    return seed if settings.seed is None else settings.seed
+
+
+class ImperfectCameras:
+    """See the module's docstring.
+
+    Attributes:
+        draw: What stays as it is.
+    """
+
     def __init__(
         self, settings: CameraSettings, markers: int, latency: float, noise: float, seed: int
     ) -> None:
         """Draw what stays; ``latency`` [s], ``noise`` per coordinate [m]."""
-        fixed, self._random = (
-            np.random.default_rng(part)
-            for part in np.random.SeedSequence(seed if settings.seed is None else settings.seed).spawn(2)
-        )
+        self._random = np.random.default_rng([_seed(settings, seed), 1])
         self._settings, self._latency, self._noise = settings, latency, noise
-        self.bias = 1e-3 * settings.marker_bias_mm * directions(fixed, markers)
-        off = directions(fixed, 2)
-        self.rotation = np.radians(settings.frame_error.rotation_deg) * off[0]
-        self.translation = 1e-3 * settings.frame_error.translation_mm * off[1]
-        self._turn = matrix_from_quaternion(quaternion_exp(self.rotation))
+        self.draw = draw_cameras(settings, markers, seed)
+        self._turn = matrix_from_quaternion(quaternion_exp(self.draw.rotation))
         self._shapes: deque[tuple[float, Array]] = deque()
         self._markers, self._last = markers, Frame(0.0, np.zeros((markers, 3)), np.zeros(markers, np.bool_))
         self._coming, self._arrival, self._newest = 0, latency + self._late(), 0.0
 
     def watch(self, t: float, nodes: Array) -> None:
-        """Remember where the ring nodes (n_markers, 3) [m] are at ``t`` [s]; between two shapes they move straight."""
+        """Remember the ring nodes (n_markers, 3) [m] at ``t`` [s]; between two shapes they move straight."""
         self._shapes.append((t, nodes))
 
     def without_noise(self) -> None:
@@ -136,8 +155,8 @@ class ImperfectCameras:
     def _reported(self, nodes: Array) -> Array:
         """Markers in the frame that the cameras take for that of the robot (n_markers, 3) [m]."""
         axes = np.repeat(ring_frames(nodes), RING, axis=0)
-        markers = nodes + np.einsum("ni,nij->nj", self.bias, axes)
-        markers = markers @ self._turn.T + self.translation
+        markers = nodes + np.einsum("ni,nij->nj", self.draw.bias, axes)
+        markers = markers @ self._turn.T + self.draw.translation
         markers = markers + self._noise * self._random.standard_normal(markers.shape)
         wild = self._random.random(self._markers) < self._settings.outliers.share
         away = 1e-3 * self._settings.outliers.size_mm * directions(self._random, self._markers)

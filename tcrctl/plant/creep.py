@@ -4,9 +4,9 @@ Beside its elastic elongation T / k a cable has one more per branch, u_i, which 
 
     τ_i du_i/dt = r_i T / k - u_i
 
-In rest it has already come, so that the robot starts where its rest lengths say; only changes count. It is a change of
-unstretched lengths between internal steps, exact for a tension that is constant during the step. [F80]
-"""
+In rest it has already come, so that the robot starts where its rest lengths say; only changes count. It is a change
+of unstretched lengths between internal steps, exact for a tension that is constant during the step.
+"""  # fmt: skip
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Creep:
         self.late = np.outer(self._strength, elastic)
 
     def step(self, elastic: Array, h: float) -> Array:
-        """Return by how much the unstretched lengths grow (n,) [m] during ``h`` [s] under elongations T / k (n,) [m]."""
+        """Return by how much unstretched lengths grow (n,) [m] in ``h`` [s] under elongations T / k (n,) [m]."""
         share = -np.expm1(-h / self._time)
         grown = share[:, None] * (np.outer(self._strength, elastic) - self.late)
         self.late += grown

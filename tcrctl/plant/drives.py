@@ -1,9 +1,12 @@
 """Drives of the simulated plant: what the controller asks for, what the cables get, what is reported.
 
-Between two internal steps a set-point is a straight line. A position loop of time constant τ that follows
-s(t) = s_0 + v t from x_0 is after h at x = x_0 + (1 - e^(-h/τ)) (S - x_0) with S = s_0 + v (h / (1 - e^(-h/τ)) - τ): the
-same as if it had followed the constant S with the lag h / (1 - e^(-h/τ)) of a loop that is sampled once per h. So the
-lag of a drive does not depend on the step.
+Between two internal steps a set-point is a straight line, s(t) = s_0 + v t. A position loop of time constant τ that
+follows it from x_0 is after a step h at
+
+    x = x_0 + h / σ (S - x_0),    σ = h / (1 - e^(-h/τ)),    S = s_0 + v (σ - τ)
+
+the same as if it had followed the constant S with the lag σ of a loop that is sampled once per h. So the lag of a
+drive does not depend on the step.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The robot that a simulated plant moves: not quite the one that the controller knows.
 
     description of the plant's robot -> unlike parts -> built -> other material -> strung otherwise
-"""
+"""  # fmt: skip
 
 from __future__ import annotations
 

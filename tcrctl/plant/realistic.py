@@ -1,6 +1,6 @@
 """``plant.realistic``: a plant with everything that real robots have, drawn in one of three sizes.
 
-*moderate* is what was seen on robots of this kind (docs/reality.md), *mild* is half of it, *severe* about twice. The draw
+*moderate* is what was seen on robots of this kind (docs/reality.md), *mild* is half of it, *severe* about twice. It
 fills in the sections of the plant that are not given; what is given wins. It does not touch ``mismatch``, noise and
 latency: they stay as the file says, and come on top.
 """

@@ -1,7 +1,7 @@
 """A control period of a plant with real drives, cables, springs and cameras, one internal step after the other.
 
     set-points -> drives -> cable taken in - late elongation -> robot -> springs give way, cables creep -> cameras
-"""
+"""  # fmt: skip
 
 from __future__ import annotations
 

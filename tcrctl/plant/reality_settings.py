@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag
 
-from tcrctl.config.keys import Finding
-from tcrctl.config.settings import NotNegative, OrOff, Positive, Settings, quantity
-from tcrctl.robot.sections import CablesOrOne, FrictionSettings
+from tcrctl.config.settings import NotNegative, Positive, Settings, quantity
+from tcrctl.robot.sections import CablesOrOne
 
 Level: TypeAlias = Literal["off", "mild", "moderate", "severe"]
 Share: TypeAlias = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -59,7 +57,8 @@ class DriveSettings(Settings):
     )
     quantisation_mm: NotNegative = quantity("mm", "one count of the encoder", 0.0)
     reports: Literal["set_point", "encoder"] = Field(
-        default="encoder", description="what the drives report: where they shall be, or where their motors are"
+        default="encoder",
+        description="what the drives report: where they shall be, or where their motors are",
     )
 
 
@@ -76,9 +75,7 @@ class CableEffects(Settings):
     initial_tension: CablesOrOne[Annotated[float, Field(gt=0.0, le=5.0)]] = quantity(
         "1", "factor on the tension at the start, common or per cable; rest lengths follow", 1.0
     )
-    creep: tuple[CreepBranch, ...] = Field(
-        default=(), strict=False, description="elongation that comes late"
-    )
+    creep: tuple[CreepBranch, ...] = Field(default=(), strict=False, description="elongation that comes late")
 
 
 class HysteresisSettings(Settings):
@@ -121,50 +118,5 @@ class CameraSettings(Settings):
     seed: Seed | None = Field(default=None, description="seed of all this; that of the run if left out")
 
 
-class RealitySettings(Settings):
-    """The sections; part of the settings of the simulated plant."""
-
-    realistic: Level = Field(
-        default="off",
-        description="draws all sections below that are not given, for a robot of this kind, by realistic_seed",
-    )
-    realistic_seed: Seed | None = Field(default=None, description="seed of it; that of the run if left out")
-    robot: OwnRobot | None = Field(
-        default=None,
-        description="robot of the plant, if it is not the one that the controller knows: name or path of a "
-        "robot file, or a map of what is different",
-    )
-    scatter: OrOff[ScatterSettings] = Field(default=None, description="unlike parts, or off")
-    friction: OrOff[FrictionSettings] = Field(
-        default=None, description="friction in the cable holes; off: what the robot's file says"
-    )
-    drives: OrOff[DriveSettings] = Field(default=None, description="imperfect drives, or off")
-    cables: OrOff[CableEffects] = Field(default=None, description="imperfect cables, or off")
-    springs_hysteresis: OrOff[HysteresisSettings] = Field(default=None, description="loss of springs, or off")
-    cameras: OrOff[CameraSettings] = Field(default=None, description="imperfect cameras, or off")
-
-
 #: Sections that ``realistic`` draws.
 DRAWN: Final = ("scatter", "friction", "drives", "cables", "springs_hysteresis", "cameras")
-
-
-def list_misfits(settings: RealitySettings, cables: tuple[str, ...], robot: str) -> Iterator[Finding]:
-    """Yield path within the section and message of every list that is not one entry per cable.
-
-    Args:
-        settings: The sections.
-        cables: Names of the robot's cables.
-        robot: Its name.
-    """
-    lists: list[tuple[tuple[str, str], Any]] = []
-    if settings.friction is not None:
-        lists.append((("friction", "coefficient"), settings.friction.coefficient))
-    if settings.drives is not None:
-        lists.append((("drives", "radius_error"), settings.drives.radius_error))
-        lists.append((("drives", "zero_error_mm"), settings.drives.zero_error_mm))
-    if settings.cables is not None:
-        lists.append((("cables", "initial_tension"), settings.cables.initial_tension))
-    for keys, value in lists:
-        if isinstance(value, tuple) and len(value) != len(cables):
-            has = f"{robot} has {len(cables)} cables, {', '.join(cables)}"
-            yield keys, f"{has}; there are {len(value)} values"

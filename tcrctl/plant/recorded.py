@@ -73,8 +73,8 @@ class Recorded:
 
     def write(self, command: Command) -> Command:
         """Return what was applied at that time; what would have been is in ``limited``."""
-        known = self._limits is not None and self._set_point is not None
-        self.limited = self._limits(command, self._set_point) if known else None
+        if self._limits is not None and self._set_point is not None:
+            self.limited = self._limits(command, self._set_point)
         return self.step.applied
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
 """A robot as it came out of the workshop: no two modules, springs and holes are alike.
 
-What is drawn is written into the description of a robot (``modules.each``, ``springs.each``, ``through``, ``base``), so
-that it can be read, logged and used again as a robot file. Cables keep the rest lengths of the robot as designed.
+What is drawn is written into the description of a robot (``modules.each``, ``springs.each``, ``through``,
+``base``), so that it can be read, logged and used again as a robot file. Rest lengths are kept.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 
 from tcrctl.plant.reality_settings import ScatterSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
-from tcrctl.robot.module import LABELS
-from tcrctl.robot.sections import FreeRoute, Hole, ModuleDifference, SpringBetween
+from tcrctl.robot.module import LABELS, ModuleDifference
+from tcrctl.robot.sections import FreeRoute, Hole, SpringBetween
 from tcrctl.signals import Array
 
 #: Relative deviations are cut off here, so that nothing gets a negative stiffness or mass.
@@ -51,7 +51,10 @@ def _factor(random: np.random.Generator, deviation: float) -> float:
 
 
 def _modules(
-    robot: RobotDescription, scatter: ScatterSettings, masses: np.random.Generator, geometry: np.random.Generator
+    robot: RobotDescription,
+    scatter: ScatterSettings,
+    masses: np.random.Generator,
+    geometry: np.random.Generator,
 ) -> tuple[ModuleDifference, ...]:
     """Mass and node places of every module."""
     given = {entry.module: entry for entry in robot.modules.each}
@@ -60,7 +63,7 @@ def _modules(
         entry = given.get(module, ModuleDifference(module=module))
         moved = scatter.geometry_mm * geometry.standard_normal((len(LABELS), 3))
         offsets: dict[Any, Any] = {
-            label: tuple((np.array(entry.offsets_mm.get(label, (0.0, 0.0, 0.0))) + by).tolist())  # type: ignore[call-overload]
+            label: tuple((np.array(entry.offsets_mm.get(label, (0.0, 0.0, 0.0))) + by).tolist())
             for label, by in zip(LABELS, moved, strict=True)
         }
         mass = robot.modules.of(module).mass_g * _factor(masses, scatter.masses)

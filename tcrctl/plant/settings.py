@@ -11,7 +11,17 @@ from pydantic_core import PydanticCustomError
 
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.settings import NotNegative, OrOff, Positive, Settings, Vector, quantity
-from tcrctl.plant.reality_settings import RealitySettings
+from tcrctl.plant.reality_settings import (
+    CableEffects,
+    CameraSettings,
+    DriveSettings,
+    HysteresisSettings,
+    Level,
+    OwnRobot,
+    ScatterSettings,
+    Seed,
+)
+from tcrctl.robot.sections import FrictionSettings
 
 
 class Mismatch(Settings):
@@ -86,8 +96,18 @@ class PlantSection(Settings):
         del period_s
         yield from ()
 
+    def list_misfits(self, cables: tuple[str, ...], robot: str) -> Iterator[Finding]:
+        """Yield place in the section and message of every list that does not go with the cables of a robot.
 
-class SimulatedSettings(PlantSection, RealitySettings):
+        Args:
+            cables: Names of the robot's cables.
+            robot: Its name.
+        """
+        del cables, robot
+        yield from ()
+
+
+class SimulatedSettings(PlantSection):
     """The robot's equations of motion, integrated by the generalized-alpha method."""
 
     kind: Literal["simulated"]
@@ -107,6 +127,24 @@ class SimulatedSettings(PlantSection, RealitySettings):
     )
     pushes: tuple[PushSettings, ...] = Field(default=(), description="forces from outside")
     dropouts: tuple[DropoutSettings, ...] = Field(default=(), description="markers that are not seen")
+    realistic: Level = Field(
+        default="off",
+        description="draws all sections below that are not given, for a robot of this kind, by realistic_seed",
+    )
+    realistic_seed: Seed | None = Field(default=None, description="seed of it; that of the run if left out")
+    robot: OwnRobot | None = Field(
+        default=None,
+        description="robot of the plant, if it is not the one that the controller knows: name or path of a "
+        "robot file, or a map of what is different",
+    )
+    scatter: OrOff[ScatterSettings] = Field(default=None, description="unlike parts, or off")
+    friction: OrOff[FrictionSettings] = Field(
+        default=None, description="friction in the cable holes; off: what the robot's file says"
+    )
+    drives: OrOff[DriveSettings] = Field(default=None, description="imperfect drives, or off")
+    cables: OrOff[CableEffects] = Field(default=None, description="imperfect cables, or off")
+    springs_hysteresis: OrOff[HysteresisSettings] = Field(default=None, description="loss of springs, or off")
+    cameras: OrOff[CameraSettings] = Field(default=None, description="imperfect cameras, or off")
 
     def rings_named(self) -> Iterator[tuple[Keys, int]]:
         """Yield place and number of every ring that is measured, pushed or hidden by name."""
@@ -130,6 +168,21 @@ class SimulatedSettings(PlantSection, RealitySettings):
         if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
             what = f"{period_s:g} s must be a whole number of steps; with {self.step_ms:g} ms it is {steps:g}"
             yield ("step_ms",), f"a control period of {what}"
+
+    def list_misfits(self, cables: tuple[str, ...], robot: str) -> Iterator[Finding]:
+        """Yield place and message of every list that has not one entry per cable."""
+        lists: list[tuple[Keys, Any]] = []
+        if self.friction is not None:
+            lists.append((("friction", "coefficient"), self.friction.coefficient))
+        if self.drives is not None:
+            lists.append((("drives", "radius_error"), self.drives.radius_error))
+            lists.append((("drives", "zero_error_mm"), self.drives.zero_error_mm))
+        if self.cables is not None:
+            lists.append((("cables", "initial_tension"), self.cables.initial_tension))
+        for keys, value in lists:
+            if isinstance(value, tuple) and len(value) != len(cables):
+                has = f"{robot} has {len(cables)} cables, {', '.join(cables)}"
+                yield keys, f"{has}; there are {len(value)} values"
 
 
 class RigSettings(PlantSection):

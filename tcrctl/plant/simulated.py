@@ -1,7 +1,7 @@
 """Simulated plant: the robot's DAE under generalized-alpha, watched by noisy, late cameras.
 
-With ideal drives, cables, springs and cameras a control period is one or two calls of the integrator; with real ones
-it goes step by step, see :mod:`tcrctl.plant.reality`.
+With ideal drives, cables, springs and cameras a control period is one or two calls of the integrator; with real
+ones it goes step by step, see :mod:`tcrctl.plant.reality`.
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ class SimulatedPlant:
         """Ring nodes as they were one latency ago, with noise, in single precision; what the drives report."""
         if self.reality is not None:
             frame = self.reality.cameras.read(self.time, self._valid, self._visible)
-            nodes = frame.nodes.astype(self._precision)
-            return Measurement(frame.t, nodes, frame.valid, self.reality.drives.reported())
+            reported = self.reality.drives.reported()
+            return Measurement(frame.t, frame.nodes.astype(self._precision), frame.valid, reported)
         nodes = self._seen[0].reshape(-1, 3)[self._rows]
         nodes = nodes + self._noise * self._random.standard_normal(nodes.shape)
         t = self.time - min(self._latency, self.time)

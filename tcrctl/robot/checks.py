@@ -6,12 +6,11 @@ from collections import Counter
 from collections.abc import Iterator
 
 from tcrctl.config.keys import Finding, Keys
-from tcrctl.robot.module import module_of, node_index
+from tcrctl.robot.module import ModuleSettings, module_of, node_index
 from tcrctl.robot.sections import (
     CableSettings,
     FreeRoute,
     FrictionSettings,
-    ModuleSettings,
     Route,
     SpringBetween,
     SpringSettings,

@@ -113,7 +113,10 @@ def spring_list(robot: RobotDescription) -> tuple[Spring, ...]:
         robot: The robot.
     """
     springs = robot.springs
-    own = {frozenset(entry.nodes): entry.model_dump(exclude={"nodes"}, exclude_none=True) for entry in springs.each}
+    own = {
+        frozenset(entry.nodes): entry.model_dump(exclude={"nodes"}, exclude_none=True)
+        for entry in springs.each
+    }
     entries = springs.entries(robot.modules.count)
     return tuple(
         _spring(entry.model_copy(update=own.get(frozenset(entry.nodes), {})), springs) for entry in entries

@@ -7,13 +7,13 @@ trapezoidal rule, which keeps the second order and the symmetric tangent.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from tcrctl.elements import bar, rubbing_cable, sliding_cable
-from tcrctl.elements.rubbing_cable import Slip, Stretches
+from tcrctl.elements.rubbing_cable import Slip
 from tcrctl.numerics.generalized_alpha import coefficients
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, Workspace, make_workspace
 from tcrctl.robot.model import Model
@@ -90,6 +90,7 @@ def unworn(model: Model, q: Array, drive: Array, tension: Array, holes: Array) -
         holes: Friction of every hole (n_holes, 3), columns as in ``elements.rubbing_cable``.
     """
     s = make_workspace(model, rubbing=True).stretches
+    assert s is not None
     cables, first = model.cables, model.first_hole
     rubbing_cable.measure(q, drive, first, model.hole_nodes, model.hole_weights, cables, s)
     along = np.repeat(tension, np.diff(first))
@@ -102,14 +103,14 @@ def unworn(model: Model, q: Array, drive: Array, tension: Array, holes: Array) -
     )
     rest = np.where(along > 0.0, rest, slack)
     zeros = np.zeros_like(along)
-    return Slip(holes, ea / rest, rest, along, zeros, zeros.copy(), np.zeros(1))
+    return Slip(holes.copy(), ea / rest, rest, along, zeros, zeros.copy(), np.zeros(1))
 
 
 def lead_direction(q: Array) -> Array:
     """Unit vector from the actuators to the base ring (3,): along the base's axis, towards the robot."""
     r = q[:9].reshape(3, 3)
     up = np.cross(r[1] - r[0], r[2] - r[0])
-    return -up / np.linalg.norm(up)
+    return np.asarray(-up / np.linalg.norm(up))
 
 
 def make_scratch(model: Model) -> Scratch:
@@ -142,7 +143,7 @@ def lengths_before(
 
 @njit(cache=True, error_model="numpy")
 def _begin_slip(
-    model: Model, q: Array, drive: Array, h: float, slip: Slip | None, s: Stretches | None, lead: Array
+    model: Model, q: Array, drive: Array, h: float, slip: Slip | None, s: Any, lead: Array
 ) -> None:
     """Start a step of cables that rub."""
     if slip is not None:
@@ -152,7 +153,7 @@ def _begin_slip(
 
 
 @njit(cache=True, error_model="numpy")
-def _finish_slip(model: Model, slip: Slip | None, s: Stretches | None) -> None:
+def _finish_slip(model: Model, slip: Slip | None, s: Any) -> None:
     """End a step of cables that rub."""
     if slip is not None:
         rubbing_cable.finish(slip, model.cables, model.first_hole, s)

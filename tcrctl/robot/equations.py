@@ -14,7 +14,7 @@ is symmetric: K + Σ_c k_c g_c g_c', K block banded, one rank-1 term per taut ca
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -165,7 +165,7 @@ def _group_row(model: Model, s: Stretches, start: int, end: int, row: Array) -> 
 
 @njit(cache=True, error_model="numpy")
 def _add_groups(model: Model, c: int, ws: Workspace, s: Stretches) -> None:
-    """Stiffness of the groups of cable ``c``: one stretch goes into ``axial`` of the banded part, several share a row."""
+    """Stiffness of the groups of cable ``c``: one stretch goes into the banded part, several share a row."""
     first, end = model.first_hole[c], model.first_hole[c + 1] - 1
     while end > first:
         start = rubbing_cable.group_start(s, first, end)
@@ -224,10 +224,10 @@ def _add_all_cables(
     drive: Array,
     load: Load,
     slip: Slip | None,
-    stretches: Stretches | None,
+    stretches: Any,
     ws: Workspace,
 ) -> float:
-    """Add the cables, with or without friction in their holes: which, is compiled in."""
+    """Add the cables, with or without friction in their holes (then both are None): which, is compiled in."""
     if slip is None:
         return _add_cables(model, q, drive, load, ws)
     return _add_rubbing(model, q, drive, slip, stretches, ws)

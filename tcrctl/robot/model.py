@@ -121,7 +121,8 @@ def freeze(model: Model) -> Model:
 def undeformed(d: RobotDescription) -> Array:
     """Node positions of the straight stack (3 n_nodes,) [m], where no rod is stretched, hung from its base."""
     nodes = straight_stack(d.modules)
-    return (nodes @ _tilt(d).T if any(d.base.tilt_deg) else nodes).ravel()
+    hung: Array = nodes @ _tilt(d).T if any(d.base.tilt_deg) else nodes
+    return hung.ravel()
 
 
 def _tilt(d: RobotDescription) -> Array:
@@ -129,7 +130,7 @@ def _tilt(d: RobotDescription) -> Array:
     x, y = np.radians(d.base.tilt_deg)
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, math.cos(x), -math.sin(x)], [0.0, math.sin(x), math.cos(x)]])
     about_y = np.array([[math.cos(y), 0.0, math.sin(y)], [0.0, 1.0, 0.0], [-math.sin(y), 0.0, math.cos(y)]])
-    return about_y @ about_x
+    return np.asarray(about_y @ about_x)
 
 
 def gravity_force(model: Model, gravity: Array) -> Array:

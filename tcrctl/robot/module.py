@@ -173,9 +173,8 @@ def straight_stack(modules: ModuleSettings) -> Array:
 
 def _depth(modules: ModuleSettings, module: int) -> float:
     """Distance of a ring plane of the straight stack below the base [m]."""
-    if not modules.each:
-        return module * (modules.pitch_mm / 1000.0)
-    return math.fsum(modules.of(i).pitch_mm for i in range(1, module + 1)) / 1000.0
+    pitch = modules.pitch_mm / 1000.0
+    return module * pitch + math.fsum(modules.of(i).pitch_mm / 1000.0 - pitch for i in range(1, module + 1))
 
 
 def mass_block(modules: ModuleSettings) -> Array:

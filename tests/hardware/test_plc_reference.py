@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from support.structured_text import FunctionBlock
 from tcr_hardware.emulators.plc_program import PlcCommand, PlcLimitSettings, PlcProgram
-from tcr_hardware.servo import ServoSettings
 from tcr_hardware.modbus.document import register_map_markdown
 from tcr_hardware.modbus.registers import Control, Fault, Reject, Status, register_map
+from tcr_hardware.servo import ServoSettings
 
 PLC = Path(__file__).parents[2] / "hardware" / "plc"
 BLOCK = FunctionBlock((PLC / "tcr_plc.st").read_text())

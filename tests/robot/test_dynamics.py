@@ -268,7 +268,7 @@ def step_of_the_bordered_system(robot, x, speed, h):
     inertia = c.acceleration + model.damping * c.velocity
     s.nodal[Q_FREE] = q0 - (x.acceleration + model.damping * v0) / inertia
     s.nodal[FORCE] = robot.weight
-    load = Load(inertia, 2.0 / h, s.nodal, s.bar_before, s.cable_before)
+    load = Load(inertia, 2.0 / h, s.nodal, s.bar_before, s.cable_before, None)
     q, node, multiplier, one = q0.copy(), x.drive.copy(), np.zeros(m), np.eye(m)
     for _ in range(12):
         assemble(model, q, node, load, ws, np.bool_(True))

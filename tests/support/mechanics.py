@@ -58,7 +58,7 @@ def rule_load(model, rng, q, inertia=0.0, w=0.0, springs=0.0):
     ends = q.reshape(-1, 3)[model.bar_nodes]
     bar_before = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) * (1 + 1e-4 * rng.standard_normal(len(ends)))
     cable_before = model.cables[:, sliding_cable.REST] + 1e-3 * rng.standard_normal(len(model.cables))
-    return Load(inertia, w, nodal, bar_before, cable_before)
+    return Load(inertia, w, nodal, bar_before, cable_before, None)
 
 
 def turned(vector):

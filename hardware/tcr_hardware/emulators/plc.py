@@ -21,9 +21,9 @@ from tcr_hardware.emulators.modbus_tcp import TcpPort
 from tcr_hardware.emulators.plc_faults import PlcFaults
 from tcr_hardware.emulators.plc_image import PlcImage, Values, identity
 from tcr_hardware.emulators.plc_program import PlcLimitSettings, PlcProgram, command_of
-from tcr_hardware.servo import ServoSettings
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.modbus.registers import RegisterMap, Status, register_map
+from tcr_hardware.servo import ServoSettings
 
 #: Most time that is made up for at once [s]: a machine that stood still is no fault of the client.
 LONGEST_CATCH_UP_S = 0.05

@@ -17,8 +17,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tcr_hardware.servo import Servo, ServoSettings
 from tcr_hardware.modbus.registers import Control, Fault, Reject, Status
+from tcr_hardware.servo import Servo, ServoSettings
 
 #: Set-points are spread over the time between the last two sets, within these bounds [s].
 SHORTEST_INTERVAL_S, LONGEST_INTERVAL_S = 0.002, 0.1

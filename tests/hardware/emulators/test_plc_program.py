@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tcr_hardware.emulators.plc_program import PlcCommand, PlcLimitSettings, PlcProgram
-from tcr_hardware.servo import Servo, ServoSettings
 from tcr_hardware.modbus.registers import Control, Fault, Reject, Status
+from tcr_hardware.servo import Servo, ServoSettings
 
 DT = 0.002
 LIMITS = PlcLimitSettings()
