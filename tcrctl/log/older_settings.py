@@ -1,6 +1,7 @@
 """Settings as logs of older versions have them, in the form of today.
 
-Files that people write are not converted: they get an error that says what to write. A log cannot be written again.
+Files that people write are not converted: they get an error that says what to write, and today's defaults. A log
+cannot be written again, and has to run as it did.
 """
 
 from __future__ import annotations
@@ -23,18 +24,42 @@ def in_todays_form(settings: Any) -> Any:
     Args:
         settings: What was read; it is not changed. What is no old form comes back as it is.
     """
-    controller = settings.get("controller") if isinstance(settings, dict) else None
-    if not isinstance(controller, dict) or controller.get("kind") != "ioc":
+    if not isinstance(settings, dict):
         return settings
+    found = dict(settings)
+    if _is_kind(found.get("controller"), "ioc"):
+        found["controller"] = _without_news(_nested(found["controller"]))
+    if _is_kind(found.get("estimator"), "passive_observer"):
+        found["estimator"] = {"fit_start": False, "hold_blank": False, **found["estimator"]}
+    return found
+
+
+def _is_kind(section: Any, kind: str) -> bool:
+    """Return whether a section is there, and of that kind."""
+    return isinstance(section, dict) and section.get("kind") == kind
+
+
+def _nested(controller: dict[str, Any]) -> dict[str, Any]:
+    """Return a controller with the keys of its prediction in ``prediction``."""
     name = controller.get("prediction", "multi_step")
     if not isinstance(name, str) or not any(key in controller for key in _BESIDE):
-        return settings
+        return controller
     meant = _MEANT.get((controller.get("model", "dynamic"), name), ())
     prediction = {"kind": name, **{key: controller[key] for key in meant if key in controller}}
-    converted: dict[str, Any] = {}
-    for key, value in controller.items():
-        if key == "prediction":
-            converted[key] = prediction
-        elif key not in _BESIDE:
-            converted[key] = value
-    return {**settings, "controller": {**converted, "prediction": prediction}}
+    converted = {key: value for key, value in controller.items() if key not in _BESIDE}
+    return {**converted, "prediction": prediction}
+
+
+def _without_news(controller: dict[str, Any]) -> dict[str, Any]:
+    """Return a controller that does without what it did not have when it ran, and has by default now."""
+    found, prediction = {"dither": "off", **controller}, controller.get("prediction", "multi_step")
+    dynamic = controller.get("model", "dynamic") == "dynamic"
+    if isinstance(prediction, str):
+        prediction = {"kind": prediction}
+    if dynamic and isinstance(prediction, dict) and prediction.get("kind", "multi_step") == "multi_step":
+        prediction = {"kind": "multi_step", "tension_gap": "off", **prediction}
+        offset = prediction.get("offset", {})
+        if isinstance(offset, dict):
+            prediction["offset"] = {"from_start": False, **offset}
+        found["prediction"] = prediction
+    return found
