@@ -1,20 +1,22 @@
 """Dither: a small fast motion of the drives that keeps the cables from sticking in their holes.
 
-Friction in the holes makes the end position a relay of the drives' directions: every reversal of a cable throws the end
-by millimetres, and a loop that does not know of it hunts. A cable that always slides to and fro feels on the mean
-only 2/π asin(U / V) of its friction, with mean speed U and dither speed V: a little damping, no relay.
+Friction in the holes makes the end position a relay of the drives' directions: every reversal of a cable throws the
+end by millimetres, and a loop that does not know of it hunts. A cable that always slides to and fro feels on the
+mean only 2/π asin(U / V) of its friction, with mean speed U and dither speed V: a little damping, no relay.
 
-    triangle wave of the drive lengths, d_c = ± A, sign +1 or -1 by cable so that forces and motions cancel
+    triangle wave of the drive lengths, ± A, sign +1 or -1 by cable so that forces and motions cancel
     A grows while the end does not go where the prediction said, and shrinks slowly otherwise
 
-The measure is the innovation: the measured end position against the one predicted a period before. A robot without
-friction does what is predicted, whatever else is wrong with its model, so its drives are left in peace. [AW89] Sec. 4.
-"""
+The measure is the innovation: the measured end position against the one predicted a period before, averaged over a
+whole wave so that the dither's own trace is not in it. A robot without friction does what is predicted, whatever
+else is wrong with its model, so its drives are left in peace. [AW89] Sec. 4.
+"""  # fmt: skip
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
@@ -25,14 +27,17 @@ from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
 
 #: Cables up to which all combinations of signs are tried; beyond, signs alternate.
-MOST_CABLES = 14
+MOST_CABLES: Final = 14
 
 
 def signs(robot: Robot) -> Array:
     """Return the directions (m,), +1 or -1, with which cables move so that the end is moved least.
 
-    Of all combinations the one with the smallest sum of axial pull (which would shake the column) and of lateral
-    pull at the end ring, both weighed by the tension and by how far a cable reaches; the first cable counts +1.
+    Of all combinations the one with the smallest sum of axial pull (which would shake the column) and of motion of
+    the end, weighed by how far a cable reaches; the first cable counts +1.
+
+    Args:
+        robot: Its gain at rest says how far a cable moves the end.
     """
     m = robot.n_cables
     if m > MOST_CABLES or m == 1:
@@ -52,57 +57,79 @@ class Dither:
     """Adaptive dither of one controller.
 
     Attributes:
-        amplitude: Half of the travel to and fro [m].
-        innovation: Filtered size of the innovation [m].
+        runs: It is on, and was not told to stand still.
     """
 
     def __init__(self, settings: DitherSettings | None, period: float, robot: Robot) -> None:
-        """Take a ``dither:`` section, or None for none, and the control period [s]."""
-        self._settings, self._period = settings, period
-        self.amplitude = self.innovation = 0.0
-        if settings is None:
-            return
-        self.amplitude = settings.least_mm / 1e3
-        self._half_wave = max(1, round(0.5 / (settings.frequency_hz * period)))
-        self._signs, self._step = signs(robot), 0
+        """Take a ``dither:`` section, or None for none, the control period [s] and the robot."""
+        self._settings, self._period, self.runs = settings or DitherSettings(), period, settings is not None
+        self._half_wave = max(1, round(0.5 / (self._settings.frequency_hz * period)))  # periods
+        self._step = (
+            self._half_wave // 2
+        )  # it begins halfway up, so that the mean of the first wave is zero too
+        self._signs = signs(robot) if self.runs else np.zeros(robot.n_cables)
+        self._sizes = np.array([self._settings.least_mm / 1e3 if self.runs else 0.0, 0.0])
         self._place = np.zeros(robot.n_cables)
-        self._expected: Array | None = None
+        self._expected = np.full(3, np.nan)
         self._errors = np.zeros((2 * self._half_wave, 3))
-        self._blend = -float(np.expm1(-period / settings.filter_s))
+        self._blend = -float(np.expm1(-period / self._settings.filter_s))
+
+    @property
+    def amplitude(self) -> float:
+        """Half of the travel to and fro [m]."""
+        return float(self._sizes[0])
+
+    @property
+    def innovation(self) -> float:
+        """Filtered size of the innovation over a wave [m]."""
+        return float(self._sizes[1])
+
+    def stand_still(self) -> None:
+        """Move no drive from now on: under a periodic input a loop has no equilibrium to linearise about."""
+        self.runs = False
 
     def memory(self) -> Mapping[str, Kept]:
-        """Return where the dither stands, if there is one."""
-        return {} if self._settings is None else {"dither": Kept(self._place, POSITION)}
+        """Return where the dither is, its amplitude and what it compares with, if it runs; its phase is time."""
+        if not self.runs:
+            return {}
+        kept = {
+            "place": self._place,
+            "sizes": self._sizes,
+            "expected": self._expected,
+            "errors": self._errors.ravel(),  # a view
+        }
+        return {f"dither_{name}": Kept(values, POSITION) for name, values in kept.items()}
 
     def observe(self, position: Array) -> None:
-        """Compare the end position (3,) [m] with what was expected a period before; moves the amplitude."""
-        s = self._settings
-        if s is None or self._expected is None:
+        """Compare the end position with the one expected a period before, and adapt the amplitude.
+
+        Args:
+            position: Measured end position (3,) [m].
+        """
+        if not self.runs or not np.isfinite(position - self._expected).all():
             return
+        s = self._settings
         self._errors[self._step % self._errors.shape[0]] = position - self._expected
-        size = float(
-            np.linalg.norm(np.mean(self._errors, axis=0))
-        )  # over a whole wave: without its own trace
-        self.innovation += self._blend * (min(size, s.outlier_mm / 1e3) - self.innovation)
-        excess = self.innovation - s.threshold_mm / 1e3
-        rate = s.growth_1_s * excess if excess > 0.0 else -self.amplitude / s.release_s
-        most, least = s.most_mm / 1e3, s.least_mm / 1e3
-        self.amplitude = min(max(self.amplitude + self._period * rate, least), most)
+        size = float(np.linalg.norm(np.mean(self._errors, axis=0)))
+        amplitude, innovation = self._sizes
+        innovation += self._blend * (min(size, s.outlier_mm / 1e3) - innovation)
+        excess = innovation - s.threshold_mm / 1e3
+        rate = s.growth_1_s * excess if excess > 0.0 else -amplitude / s.release_s
+        grown = min(max(amplitude + self._period * rate, s.least_mm / 1e3), s.most_mm / 1e3)
+        self._sizes[:] = grown, innovation
 
     def expect(self, position: Array | None) -> None:
         """Take the end position (3,) [m] that is expected one period from now; None if nothing is."""
-        self._expected = position
+        self._expected[:] = np.nan if position is None else position
 
-    def speed(self) -> Array | float:
-        """Return what is added to the drive speeds of the coming period (m,) [m/s]."""
-        if self._settings is None:
-            return 0.0
-        self._step += 1
+    def speed(self) -> Array:
+        """Move on by a period, and return what is added to the drive speeds in it (m,) [m/s]."""
+        if not self.runs:
+            return np.zeros(self._place.size)
         up = 1.0 if (self._step // self._half_wave) % 2 == 0 else -1.0
-        ramp = (
-            2.0 * self.amplitude / self._half_wave
-        )  # per period; halfway at first, so that the mean is zero
+        self._step += 1
+        ramp = 2.0 * self.amplitude / self._half_wave  # way of a period
         wanted = np.clip(self._place + up * ramp * self._signs, -self.amplitude, self.amplitude)
         moved = wanted - self._place
-        self._place = wanted
+        self._place[:] = wanted
         return np.asarray(moved / self._period)

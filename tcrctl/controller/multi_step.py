@@ -8,7 +8,8 @@
 
 Δ shifts the equilibrium instead of adding a force: a constant force that holds a wrong axial tension would press
 on the slender robot like a dead load and make the prediction buckle. Weighing forces instead of filtering δ keeps
-the lightly damped lateral mode out of Δ. See docs/control.md.
+the lightly damped lateral mode out of Δ. At the first step the robot rests, and all of δ is Δ (``from_start``). See
+docs/control.md.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning
 from tcrctl.controller.settings import MultiStepSettings
-from tcrctl.memory import POSITION, SPEED, TENSION, Kept
+from tcrctl.controller.tension_gap import TensionGap
+from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, pose, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
@@ -121,28 +123,26 @@ class MultiStep:
         basis = response.start_basis(robot.model, self._work, settings.modes)
         self._memory = Memory(at, still, still.copy(), basis)
         self._solved = False
-        offset, gap = settings.offset, settings.tension_gap
-        self._fresh = offset is not None and offset.from_start
-        self._gap_blend = 0.0 if gap is None else -float(np.expm1(-period / gap.filter_s))
-        self._gap: Array | None = None
+        self._fresh = settings.offset is not None and settings.offset.from_start
+        self._gap = TensionGap(settings.tension_gap, period, robot.n_cables)
 
     def sharpen(self) -> None:
         """See :class:`tcrctl.controller.inner_map.Linearisable`."""
         self._tuning = self._tuning.sharp()
 
     def memory(self) -> Mapping[str, Kept]:
-        """Return offset and last velocities without the fixed base, if the offset moves.
+        """Return offset and last velocities without the fixed base, if the offset moves, and the tension gap.
 
         The basis is left out: it turns within the modes it spans, which changes no response, and with nothing
         left to correct an error of it has no effect of first order.
         """
         if self._tuning.blend == 0.0:
-            return {}
+            return self._gap.memory()
         first = 3 * FIXED
         return {
             "offset": Kept(self._memory.offset[first:], POSITION),
             "last_v": Kept(self._memory.v[first:], SPEED),
-            **({} if self._gap is None else {"tension_gap": Kept(self._gap, TENSION)}),
+            **self._gap.memory(),
         }
 
     def inner_map(self) -> InnerMap | None:
@@ -157,26 +157,16 @@ class MultiStep:
         now = Now(estimate.q + age * estimate.v, estimate.v, estimate.drive, outputs)
         tuning = self._tuning
         if self._fresh:  # the robot rests: all of its deviation is offset
-            memory.v[:], tuning, self._fresh = estimate.v, tuning._replace(blend=1.0), False
+            memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0)
         outcome, stable, free, gain = forecast(
             robot.model, self._load, self._work, memory, now, self.grid, robot.tip, tuning
         )
-        if self._gap_blend and outcome.converged:
-            free[:, POSE_ROWS:] -= self._lasting_gap(estimate.tension - self._work.tension)
+        if outcome.converged:
+            free[:, POSE_ROWS:] -= self._gap.lasting(estimate.tension - self._work.tension)
+            self._fresh = False
         good, self._solved = outcome.converged and stable, outcome.converged
         reason = "" if good else "the model has no stable equilibrium at the present drives"
         at_rest = None
         if self._feedforward:
             at_rest = pose.drive_gain(memory.at.equilibrium, memory.at.gain, robot.tip)[:6]
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)
-
-    def _lasting_gap(self, gap: Array) -> Array:
-        """Return what lasts of the difference between the estimated and the model's tensions (m,) [N].
-
-        A millimetre of length error is 1.5 N, so tensions read off marker positions are wrong by newtons for ever,
-        and a controller that believes them winds in or pays out. Only what changes faster than the filter is believed.
-        """
-        if self._gap is None:
-            self._gap = gap
-        self._gap = self._gap + self._gap_blend * (gap - self._gap)
-        return self._gap

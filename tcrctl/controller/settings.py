@@ -63,7 +63,10 @@ class OffsetSettings(Settings):
     """Estimates where the robot would come to rest, as opposed to where the model would."""
 
     filter_s: float = quantity("s", "time constant of the estimate", 0.3, gt=0)
-    from_start: bool = Field(default=True, description="begin with the first frame's offset instead of none")
+    from_start: bool = Field(
+        default=True,
+        description="begin with the first frame's offset instead of none; model: dynamic only",
+    )
 
 
 class TensionGapSettings(Settings):
@@ -86,6 +89,15 @@ class DitherSettings(Settings):
     filter_s: float = quantity("s", "time constant of the innovation's size", 0.5, gt=0)
     outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
 
+    @model_validator(mode="after")
+    def _in_order(self) -> DitherSettings:
+        refuse(self._disorder())
+        return self
+
+    def _disorder(self) -> Iterator[Finding]:
+        if self.least_mm > self.most_mm:
+            yield ("least_mm",), f"must be at most most_mm, {self.most_mm:g}, not {self.least_mm:g}"
+
 
 class MultiStepSettings(Settings):
     """Linear response over the horizon, or with ``model: static`` the static answer to the drives."""
@@ -101,7 +113,8 @@ class MultiStepSettings(Settings):
         default=OffsetSettings(), description="offset of the equilibrium, or off"
     )
     tension_gap: OrOff[TensionGapSettings] = Field(
-        default=TensionGapSettings(), description="lasting differences of tension, left out, or off"
+        default=TensionGapSettings(),
+        description="lasting differences of tension, left out, or off; model: dynamic only",
     )
     feedforward: bool = Field(
         default=True,
@@ -118,6 +131,10 @@ class MultiStepSettings(Settings):
         yield from _too_short(self.horizon_s, period_s)
         if model == "static" and self.modes != MODES:
             yield ("modes",), "has no meaning with model: static; leave it out"
+        if model == "static" and self.tension_gap != TensionGapSettings():
+            yield ("tension_gap",), "has no meaning with model: static; leave it out"
+        if model == "static" and self.offset is not None and not self.offset.from_start:
+            yield ("offset", "from_start"), "has no meaning with model: static; leave it out"
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> MultiStepSettings:

@@ -1,7 +1,7 @@
 """What all controllers that feed the end pose back have in common, whatever finds their speeds.
 
 reference, estimate -> pose error -> integral shift -+
-estimate -> doubt, speed and stroke limits ----------+-> planner -> plan -> limits -> command
+estimate -> doubt, speed and stroke limits ----------+-> planner -> plan -> limits -> + dither -> limits -> command
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ class Shell:
 
     Attributes:
         ahead: Instants after the step at which the planner wants the reference (n,) [s].
+        dither: What is added to the planned speeds against friction.
     """
 
     ahead: Array
@@ -49,7 +50,8 @@ class Shell:
         reason = at.doubt or plan.reason
         self._speed = np.zeros(self._robot.n_cables) if reason else at.within(plan.speed)
         self.dither.expect(None if reason else plan.expected)
-        speed = self._speed if reason else at.within(self._speed + self.dither.speed())
+        shaken = self.dither.runs and not reason
+        speed = at.within(self._speed + self.dither.speed()) if shaken else self._speed
         limit = speed_limit(self._settings)
         self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
         info = ControlInfo(
@@ -89,11 +91,12 @@ class Shell:
         )
 
     def sharpen(self) -> None:
-        """Let the planner solve to rounding."""
+        """Let the planner solve to rounding, and the dither stand still."""
+        self.dither.stand_still()
         self._planner.sharpen()
 
     def memory(self) -> Mapping[str, Kept]:
-        """Return the last input, the integral action, and what the planner keeps."""
+        """Return the last planned input, the integral action, and what dither and planner keep."""
         return {
             "speed": Kept(self._speed, SPEED),
             **self._integral.memory(self._normal),

@@ -10,6 +10,9 @@ buckles if they are hard. So the stiffness falls with the square of the share of
 
 A mismatched model keeps the springs stretched. So the end pose is corrected by the filtered difference between
 the measured tip ring and the model's; while the tip ring is not seen, the last correction stays.
+
+A robot may hang beside its model from the start: the first frame is taken for a robot at rest (``fit_start``). A
+frame without any marker would let the model swing back there: it repeats the last one (``hold_blank``).
 """
 
 from __future__ import annotations
@@ -37,9 +40,10 @@ FIT_ITERATIONS = 80
 
 
 class PassiveObserver:
-    """See the module's docstring. State: positions, velocities, drives, correction of the end pose."""
+    """See the module's docstring. State: positions, velocities, drives, correction of the end pose, last frame."""
 
     def __init__(self, settings: PassiveObserverSettings, robot: Robot, period: float) -> None:
+        """Take an ``estimator:`` section, the robot and the control period [s]."""
         self._robot, self._period = robot, period
         self._stiffness = settings.stiffness_n_m
         self._blend = -float(np.expm1(-period / settings.pose_filter_s))
@@ -52,7 +56,7 @@ class PassiveObserver:
         self._correction = np.zeros(6)
         self._updates = 0
         self._fits, self._holds = settings.fit_start, settings.hold_blank
-        self._last: Measurement | None = None
+        self._frame, self._frame_valid = np.zeros((rows.size, 3)), np.zeros(rows.size, dtype=np.bool_)
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._scratch.nodal[FORCE] = robot.weight
         self._valid, self._seen = np.zeros(rows.shape[0], dtype=np.bool_), self._coordinates[:0]
@@ -72,25 +76,23 @@ class PassiveObserver:
         return Load(inertia, 1.0 / period, s.nodal, s.bar_before, s.cable_before, None)
 
     def _held(self, measured: Measurement) -> Measurement:
-        """Return the frame, or the last one with markers in the place of a blank one."""
+        """Return the frame; the last one with markers in the place of a blank one."""
         if measured.valid.any():
-            self._last = measured
-        elif self._holds and self._last is not None:
-            return replace(measured, nodes=self._last.nodes, valid=self._last.valid)
+            self._frame[:] = np.where(measured.valid[:, None], measured.nodes, 0.0)
+            self._frame_valid = measured.valid.copy()
+        elif self._holds and self._frame_valid.any():
+            return replace(measured, nodes=self._frame.copy(), valid=self._frame_valid)
         return measured
 
-    def _fit(self, measured: Measurement) -> bool:
-        """Fit the resting model to a frame by statics, so that the robot does not seem to jump there in a step."""
-        if not measured.valid.any():
-            return False
+    def _fit(self, measured: Measurement) -> None:
+        """Fit the resting model to a frame by statics: virtual springs and weight, no inertia, no damping.
+
+        So the robot does not seem to jump there in a step. Without a solution the model stays at its own rest.
+        """
         still = self._load(measured)._replace(inertia=0.0, w=0.0)
-        q, drive = self._q.copy(), measured.drive.copy()
-        if minimise(
-            self._robot.model, q, drive, still, self._work, TOLERANCE, FIT_ITERATIONS, False
-        ).converged:
-            self._q, self._drive = q, drive
-            self._v = np.zeros_like(q)
-        return True
+        model, q, drive = self._robot.model, self._q.copy(), measured.drive.copy()
+        if minimise(model, q, drive, still, self._work, TOLERANCE, FIT_ITERATIONS, False).converged:
+            self._q, self._v, self._drive = q, np.zeros_like(q), drive
 
     def _correct(self, measured: Measurement) -> tuple[Array, Array]:
         """End position and normal, corrected by what the tip ring's markers say."""
@@ -107,7 +109,7 @@ class PassiveObserver:
         return position + self._correction[:3], turned / np.linalg.norm(turned)
 
     def memory(self) -> Mapping[str, Kept]:
-        """Positions and velocities without the fixed base, drives, correction of the end pose."""
+        """Return positions and velocities without the base, drives, pose correction, and the last frame."""
         first = 3 * FIXED
         return {
             "q": Kept(self._q[first:], POSITION),
@@ -115,14 +117,16 @@ class PassiveObserver:
             "drive": Kept(self._drive, POSITION),
             "correction_position": Kept(self._correction[:3], POSITION),
             "correction_normal": Kept(self._correction[3:], NORMAL),
+            **({"frame": Kept(self._frame.ravel(), POSITION)} if self._holds else {}),
         }
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Step the model to the time of ``measured``; the drives are those that it reports."""
         del applied
         measured = self._held(measured)
-        if self._fits:
-            self._fits = not self._fit(measured)
+        if self._fits and measured.valid.any():
+            self._fit(measured)
+            self._fits = False
         load = self._load(measured)
         q = self._q.copy()
         model, drive = self._robot.model, measured.drive
