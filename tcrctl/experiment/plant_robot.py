@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.strict_yaml import Document
 from tcrctl.errors import InputError
-from tcrctl.plant.own_robot import own_description
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
-from tcrctl.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from tcrctl.robot.robot import Robot
 
 #: Where it stands in an experiment.
 KEYS: Keys = ("plant", "robot")
@@ -103,4 +104,7 @@ def description_of_plant(
     """
     if own is None and plant.scatter is None:
         return None
+    # numpy is slow to import, and a file is checked without it
+    from tcrctl.plant.own_robot import own_description
+
     return own_description(plant, own or robot, built if own is None else None, seed)

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Final
 
 from tcrctl.plant.reality_settings import (
     DRAWN,
@@ -25,6 +23,9 @@ from tcrctl.plant.reality_settings import (
 )
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.robot.sections import FrictionSettings
+
+if TYPE_CHECKING:  # numpy is imported where something is drawn: checking a file needs none
+    import numpy as np
 
 #: Time constant of the cables' creep [s].
 CREEP_TIME_S: Final = 10.0
@@ -121,6 +122,8 @@ def rehearsal_plant(settings: PlantSettings) -> SimulatedSettings:
 
 def draw(sizes: Sizes, cables: int, seed: int) -> dict[str, Any]:
     """Return all sections of one plant; what has a seed of its own gets one that follows from ``seed``."""
+    import numpy as np
+
     random = np.random.default_rng(np.random.SeedSequence([seed, 0x7C7]))
     scatter_seed, camera_seed = (int(part) for part in random.integers(2**31, size=2))
     friction = round(float(random.uniform(*sizes.friction)), 4)
@@ -161,5 +164,7 @@ def draw(sizes: Sizes, cables: int, seed: int) -> dict[str, Any]:
 
 def _each(random: np.random.Generator, size: float, count: int) -> tuple[float, ...]:
     """Draw one value per cable, none beyond twice the standard deviation."""
+    import numpy as np
+
     drawn = np.clip(random.standard_normal(count), -2.0, 2.0)
     return tuple(round(float(size * x), 6) for x in drawn)

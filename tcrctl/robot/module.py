@@ -9,15 +9,17 @@ instance, begins as another file like this one.
 from __future__ import annotations
 
 import math
-from typing import Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from tcrctl.config.settings import Settings, Vector, quantity
-from tcrctl.elements import torus
-from tcrctl.signals import Array
+
+if TYPE_CHECKING:  # numpy is imported where arrays are made: checking a robot file needs none
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from tcrctl.signals import Array
 
 LABELS: Final = ("n1", "n2", "n3", "apex")
 #: Nodes of one module: first those of its ring, counter-clockwise seen from +z, then the apex.
@@ -31,7 +33,7 @@ FIXED: Final = NODES
 #: Rods and ring sides per module; they come first among the bars.
 RIGID_BARS: Final = 6
 
-_Rows = TypeVar("_Rows", int, NDArray[np.int64])
+_Rows = TypeVar("_Rows", int, "NDArray[np.int64]")
 
 
 class ModuleDifference(Settings):
@@ -148,6 +150,8 @@ def rods(module: int) -> list[tuple[int, int]]:
 
 def rigid_bars(module: int) -> list[tuple[int, int]]:
     """Return rods and ring sides of a module, RIGID_BARS pairs of node rows."""
+    from tcrctl.elements import torus
+
     return rods(module) + torus.sides(ring_nodes(module))
 
 
@@ -157,6 +161,10 @@ def straight_stack(modules: ModuleSettings) -> Array:
     Args:
         modules: Section of the robot file.
     """
+    import numpy as np
+
+    from tcrctl.elements import torus
+
     nodes = np.zeros((node_count(modules.count), 3))
     offsets = modules.offsets()
     for module in range(modules.count + 1):
@@ -183,6 +191,10 @@ def mass_block(modules: ModuleSettings) -> Array:
     Args:
         modules: Section of the robot file, as it is for that module.
     """
+    import numpy as np
+
+    from tcrctl.elements import torus
+
     cell = modules.mass_g / 1000.0
     block = np.zeros((NODES, NODES))
     for k in range(RING):

@@ -18,7 +18,7 @@ from support.log_files import doctor
 from support.short_runs import ROOT, SHORT, arguments, short_spec, start
 from tcrctl.analysis.info import inspect
 from tcrctl.cli.app import main
-from tcrctl.controller.instantaneous import InstantaneousOptimalControl
+from tcrctl.controller.shell import Shell
 from tcrctl.errors import DeviceError, DivergenceError, InputError, LogError
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import run_experiment
@@ -216,14 +216,14 @@ def test_a_fault_of_the_program_leaves_a_finished_log_and_a_closed_plant(short, 
 @pytest.mark.slow
 def test_a_controller_that_raises_leaves_a_finished_log_and_a_closed_plant(short, tmp_path, monkeypatch):
     closed = failing_plant(monkeypatch, DeviceError("unused"))
-    control = InstantaneousOptimalControl.control
+    control = Shell.control
 
     def failing_control(self, estimate, reference):
         if reference.t > 0.38:
             raise FloatingPointError("a bug of the controller")
         return control(self, estimate, reference)
 
-    monkeypatch.setattr(InstantaneousOptimalControl, "control", failing_control)
+    monkeypatch.setattr(Shell, "control", failing_control)
     with pytest.raises(FloatingPointError):
         run_experiment(short, out=tmp_path)
     (path,) = tmp_path.glob("*/log.mcap")
