@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from support import mechanics
 from tcrctl.errors import InputError
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.settings import ExactSettings, PassiveObserverSettings
@@ -17,12 +18,18 @@ from tcrctl.signals import Command
 PERIOD = 0.05
 
 
-def watch(robot, seconds, *, mismatch=None, noise=0.0, spoil=lambda k, measured: measured, speed=0.01):
+def observe(robot, **settings):
+    return build_estimator(PassiveObserverSettings(kind="passive_observer", **settings), robot, PERIOD, None)
+
+
+def watch(
+    robot, seconds, *, mismatch=None, noise=0.0, spoil=lambda k, measured: measured, speed=0.01, **settings
+):
     """Run a plant with smooth drive speeds beside the observer; yields (truth, estimate, true v) per step."""
     plant = SimulatedPlant(
         SimulatedSettings(kind="simulated", step_ms=2.5, mismatch=mismatch, noise_um=noise), robot, PERIOD, 1
     )
-    observer = build_estimator(PassiveObserverSettings(kind="passive_observer"), robot, PERIOD, None)
+    observer = observe(robot, **settings)
     m = robot.n_cables
     applied = Command(np.zeros(m), np.zeros(m))
     for k in range(round(seconds / PERIOD)):
@@ -87,12 +94,87 @@ def test_a_ring_that_is_not_seen_for_two_seconds_does_no_harm(tcr700, ring):
         assert np.linalg.norm(estimate.position - truth.position) < 5e-4
 
 
-def test_without_any_marker_the_model_goes_on_alone(tcr600):
-    def hide_all(k, measured):
-        return replace(measured, valid=np.zeros_like(measured.valid)) if k > 10 else measured
+def blank(measured):
+    """The frame without any marker."""
+    return replace(measured, valid=np.zeros_like(measured.valid), nodes=np.full_like(measured.nodes, np.nan))
 
-    errors = [np.linalg.norm(e.position - t.position) for t, e, _ in watch(tcr600, 3.0, spoil=hide_all)]
-    assert max(errors) < 5e-3
+
+def test_without_any_marker_the_model_goes_on_alone(tcr600):
+    """If it is told to; it has the right material here."""
+
+    def hide_all(k, measured):
+        return blank(measured) if k > 10 else measured
+
+    found = list(watch(tcr600, 3.0, spoil=hide_all, hold_blank=False))
+    assert max(np.linalg.norm(e.position - t.position) for t, e, _ in found) < 5e-3
+    assert not found[-1][1].disturbance.any()
+
+
+def test_blank_frames_repeat_the_last_one(tcr600):
+    seen = []
+
+    def hide(k, measured):
+        seen.append(measured)
+        return blank(measured) if 10 <= k < 20 else measured
+
+    def repeat(k, measured):
+        return replace(measured, nodes=seen[9].nodes, valid=seen[9].valid) if 10 <= k < 20 else measured
+
+    held = [e for _, e, _ in watch(tcr600, 1.5, spoil=hide)]
+    repeated = [e for _, e, _ in watch(tcr600, 1.5, spoil=repeat)]
+    for one, other in zip(held, repeated, strict=True):
+        assert np.array_equal(one.q, other.q)
+        assert np.array_equal(one.position, other.position)
+
+
+def test_before_any_marker_was_seen_there_is_nothing_to_repeat(tcr600):
+    """And the model is fitted to the first frame that has some."""
+    estimates = [e for _, e, _ in watch(tcr600, 0.5, spoil=lambda k, m: blank(m) if k < 3 else m, speed=0.0)]
+    for estimate in estimates:
+        assert estimate.converged
+        assert np.max(np.abs(estimate.q - tcr600.rest.q)) < 1e-5
+
+
+def test_a_model_that_is_fitted_to_the_first_frame_does_not_move_there(tcr600):
+    """The robot hangs 25 mm beside its model; fitted or not, it ends where the markers are."""
+    beside = mechanics.altered("tcr600", "base.tilt_deg=[22.5,0]")
+    plant = SimulatedPlant(SimulatedSettings(kind="simulated"), beside, PERIOD, 1)
+    frame, still = plant.read(), Command(np.zeros(3), np.zeros(3))
+    speeds = {}
+    for fit in (True, False):
+        observer = observe(tcr600, fit_start=fit)
+        estimates = [observer.update(frame, still) for _ in range(60)]
+        speeds[fit] = np.abs(estimates[0].v).max()
+        assert np.linalg.norm(estimates[-1].position - plant.truth().position) < 1e-4
+    assert np.linalg.norm(plant.truth().position - tcr600.rest_position) > 0.02
+    assert speeds[True] < 1e-3
+    assert speeds[False] > 0.2
+
+
+def test_a_frame_that_nothing_can_be_fitted_to_leaves_the_model_at_rest(tcr600):
+    plant = SimulatedPlant(SimulatedSettings(kind="simulated"), tcr600, PERIOD, 1)
+    frame, still = plant.read(), Command(np.zeros(3), np.zeros(3))
+    observer = observe(tcr600)
+    absurd = replace(frame, nodes=frame.nodes[::-1] * 1e6)
+    assert not observer.update(absurd, still).converged
+    assert np.max(np.abs(observer.update(frame, still).q - tcr600.rest.q)) < 1e-5
+
+
+def test_what_it_remembers_is_all_that_the_next_update_depends_on(tcr600):
+    """A blank frame too."""
+    moved = Command(np.zeros(3), np.full(3, 0.004))
+    plant = SimulatedPlant(SimulatedSettings(kind="simulated"), tcr600, PERIOD, 1)
+    one, other = observe(tcr600), observe(tcr600)
+    other.update(plant.read(), moved)
+    for _ in range(30):
+        plant.write(Command(np.full(3, 0.01), np.zeros(3)))
+        one.update(plant.read(), moved)
+        other.update(plant.read(), moved)
+    one.update(plant.read(), moved)
+    for name, kept in one.memory().items():
+        other.memory()[name].values[:] = kept.values
+    nothing = blank(plant.read())
+    assert np.array_equal(one.update(nothing, moved).q, other.update(nothing, moved).q)
 
 
 def test_estimates_are_not_changed_by_later_updates(tcr600):

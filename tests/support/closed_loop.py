@@ -32,7 +32,7 @@ def settings_of(kind, **changes):
 def ioc(prediction="multi_step", **changes) -> IocSettings:
     """Settings of a way to predict; keys of a multi-step prediction are changed where they belong."""
     chosen = dict(PREDICTIONS[prediction])
-    below = {key: changes.pop(key) for key in ("offset", "feedforward") if key in changes}
+    below = {key: changes.pop(key) for key in ("offset", "feedforward", "tension_gap") if key in changes}
     if below:
         chosen["prediction"] = {**chosen["prediction"], **below}
     return IocSettings(kind="ioc", **{**chosen, **changes})
@@ -67,11 +67,14 @@ def constant(robot, controller, offset=(0.0, 0.0, 0.0), t=0.0) -> Reference:
     )
 
 
-def closed_loop(robot, settings, offset, seconds, mismatch=None, noise=0.0, latency=0.0):
-    """Errors (n,) [m], commands (n, m) and infos of a controller that is asked to go to one target."""
+def closed_loop(robot, settings, offset, seconds, mismatch=None, noise=0.0, latency=0.0, **plant):
+    """Errors (n,) [m], commands (n, m) and infos of a controller that is asked to go to one target.
+
+    Further keys of the plant's section are given by name.
+    """
     plant = SimulatedPlant(
         SimulatedSettings(
-            kind="simulated", step_ms=2.5, mismatch=mismatch, noise_um=noise, latency_ms=latency
+            kind="simulated", step_ms=2.5, mismatch=mismatch, noise_um=noise, latency_ms=latency, **plant
         ),
         robot,
         settings.period_s,
