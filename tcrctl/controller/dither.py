@@ -70,7 +70,7 @@ class Dither:
         self._signs = signs(robot) if self.runs else np.zeros(robot.n_cables)
         self._sizes = np.array([self._settings.least_mm / 1e3 if self.runs else 0.0, 0.0])
         self._place = np.zeros(robot.n_cables)
-        self._expected = np.full(3, np.nan)
+        self._expects, self._expected = False, np.zeros(3)
         self._errors = np.zeros((2 * self._half_wave, 3))
         self._blend = -float(np.expm1(-period / self._settings.filter_s))
 
@@ -89,7 +89,10 @@ class Dither:
         self.runs = False
 
     def memory(self) -> Mapping[str, Kept]:
-        """Return where the dither is, its amplitude and what it compares with, if it runs; its phase is time."""
+        """Return where the dither is, its amplitude and what it compares with, if it runs.
+
+        Its phase is left out: that is time.
+        """
         if not self.runs:
             return {}
         kept = {
@@ -106,7 +109,7 @@ class Dither:
         Args:
             position: Measured end position (3,) [m].
         """
-        if not self.runs or not np.isfinite(position - self._expected).all():
+        if not (self.runs and self._expects and np.isfinite(position).all()):
             return
         s = self._settings
         self._errors[self._step % self._errors.shape[0]] = position - self._expected
@@ -120,7 +123,8 @@ class Dither:
 
     def expect(self, position: Array | None) -> None:
         """Take the end position (3,) [m] that is expected one period from now; None if nothing is."""
-        self._expected[:] = np.nan if position is None else position
+        self._expects = position is not None and bool(np.isfinite(position).all())
+        self._expected[:] = position if position is not None and self._expects else 0.0
 
     def speed(self) -> Array:
         """Move on by a period, and return what is added to the drive speeds in it (m,) [m/s]."""

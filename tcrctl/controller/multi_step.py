@@ -23,8 +23,8 @@ from numba import njit
 from tcrctl.controller.blocks import Grid, make_grid, superpose
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
+from tcrctl.controller.prediction_settings import MultiStepSettings
 from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning
-from tcrctl.controller.settings import MultiStepSettings
 from tcrctl.controller.tension_gap import TensionGap
 from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, pose, response

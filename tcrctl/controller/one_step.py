@@ -13,8 +13,8 @@ import numpy as np
 from tcrctl.controller.blocks import make_grid
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
+from tcrctl.controller.prediction_settings import OneStepSettings
 from tcrctl.controller.predictor import Forecast
-from tcrctl.controller.settings import OneStepSettings
 from tcrctl.memory import Kept
 from tcrctl.robot import dynamics, linear, pose
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, make_workspace

@@ -20,8 +20,8 @@ from numba import njit
 from tcrctl.controller.blocks import Grid, make_grid, superpose
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
+from tcrctl.controller.prediction_settings import MultiStepSettings
 from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning
-from tcrctl.controller.settings import MultiStepSettings
 from tcrctl.memory import NORMAL, POSITION, TENSION, Kept
 from tcrctl.robot import pose
 from tcrctl.robot.equations import Load, Workspace, make_workspace

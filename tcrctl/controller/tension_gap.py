@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tcrctl.controller.settings import TensionGapSettings
+from tcrctl.controller.prediction_settings import TensionGapSettings
 from tcrctl.memory import TENSION, Kept
 from tcrctl.signals import Array
 

@@ -27,14 +27,8 @@ from tcrctl.controller.controller import PLANNERS, build_controller
 from tcrctl.controller.cost import outputs
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.multi_step import MultiStep
-from tcrctl.controller.settings import (
-    ControllerSettings,
-    CostWeights,
-    IntegralSettings,
-    IocSettings,
-    OffsetSettings,
-    Prediction,
-)
+from tcrctl.controller.prediction_settings import OffsetSettings, Prediction
+from tcrctl.controller.settings import ControllerSettings, CostWeights, IntegralSettings, IocSettings
 from tcrctl.plant.settings import Mismatch
 from tcrctl.robot import dynamics, pose
 from tcrctl.robot.equations import make_workspace

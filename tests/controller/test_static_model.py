@@ -12,7 +12,7 @@ from support.closed_loop import closed_loop, constant, ioc, pose_settings, resti
 from tcrctl.controller.blocks import block_edges
 from tcrctl.controller.controller import build_controller
 from tcrctl.controller.cost import outputs
-from tcrctl.controller.settings import OffsetSettings
+from tcrctl.controller.prediction_settings import OffsetSettings
 from tcrctl.controller.static import Static
 from tcrctl.plant.settings import Mismatch
 from tcrctl.robot import pose

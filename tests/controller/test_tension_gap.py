@@ -7,7 +7,7 @@ import pytest
 
 from support.closed_loop import closed_loop, ioc, resting
 from tcrctl.controller.multi_step import MultiStep
-from tcrctl.controller.settings import MultiStepSettings, TensionGapSettings
+from tcrctl.controller.prediction_settings import MultiStepSettings, TensionGapSettings
 from tcrctl.controller.tension_gap import TensionGap
 from tcrctl.robot.response import POSE_ROWS
 

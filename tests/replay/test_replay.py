@@ -15,7 +15,7 @@ from support.log_files import doctor
 from support.short_runs import short_spec
 from tcrctl.cli.app import main
 from tcrctl.config import strict_yaml
-from tcrctl.controller.settings import MultiStepSettings
+from tcrctl.controller.prediction_settings import MultiStepSettings
 from tcrctl.errors import InputError, LogError
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import log_geometry, run_experiment
@@ -43,6 +43,17 @@ VARIANTS = {
     "saturated": ("controller.speed_limit_mm_s=4",),
     "stopped": ("safety.position_error_mm=0.2",),
 }
+BEFORE = ("controller.dither=off", "estimator={kind: passive_observer, fit_start: false, hold_blank: false}")
+#: Estimator and controller as they were before the keys that a log of then does not have.
+FORMER = {
+    "multi_step": (
+        *BEFORE,
+        "controller.prediction.tension_gap=off",
+        "controller.prediction.offset.from_start=false",
+    ),
+    "literal": (*BEFORE, *VARIANTS["literal"]),
+    "one_step": (*BEFORE, *VARIANTS["one_step"]),
+}
 REST_SHORT = [f"trajectory.{key}_s=0.5" for key in ("blend_in", "blend_out", "lead_in", "dwell", "settle")]
 
 
@@ -53,7 +64,8 @@ def logs(tmp_path_factory):
 
     def log(name):
         if name not in made:
-            made[name] = run_experiment(prepare(short_spec(*VARIANTS[name])), out=folder).log
+            overrides = FORMER[name.removeprefix("former ")] if name.startswith("former") else VARIANTS[name]
+            made[name] = run_experiment(prepare(short_spec(*overrides)), out=folder).log
         return made[name]
 
     return log
@@ -104,16 +116,29 @@ def test_every_kind_of_run_replays_bit_for_bit(logs, name):
     assert (found.environment, found.not_compared) == ((), ())
 
 
-@pytest.mark.parametrize("name", ["full", "literal", "one_step"])
-def test_a_log_with_the_settings_of_an_older_version_replays_bit_for_bit(logs, tmp_path, name):
-    """All keys of a prediction stood beside it then, with or without a meaning for its kind."""
-    settings = strict_yaml.loads(read_log(logs(name)).attachments[RESOLVED][1]).data
-    controller, prediction = settings["controller"], settings["controller"]["prediction"]
-    beside = MultiStepSettings(kind="multi_step").model_dump(mode="json") | prediction
-    settings["controller"] = {**controller, **beside, "kind": "ioc", "prediction": prediction["kind"]}
-    text = strict_yaml.dumps(settings).encode()
-    path = rewritten(logs(name), tmp_path / "old.mcap", attachments={RESOLVED: ("application/yaml", text)})
-    assert replay(path).status == "identical"
+def as_before(settings, beside):
+    """Resolved settings without the keys that did not exist; also with a prediction's keys beside it."""
+    controller = {key: value for key, value in settings["controller"].items() if key != "dither"}
+    prediction = {key: value for key, value in controller["prediction"].items() if key != "tension_gap"}
+    if "offset" in prediction:
+        prediction["offset"] = {"filter_s": prediction["offset"]["filter_s"]}
+    controller["prediction"] = prediction
+    if beside:
+        every = MultiStepSettings(kind="multi_step").model_dump(mode="json", exclude={"tension_gap"})
+        every["offset"].pop("from_start")
+        controller = {**controller, **every, **prediction, "kind": "ioc", "prediction": prediction["kind"]}
+    estimator = {k: v for k, v in settings["estimator"].items() if k not in ("fit_start", "hold_blank")}
+    return {**settings, "controller": controller, "estimator": estimator}
+
+
+@pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize("name", FORMER)
+def test_a_log_with_the_settings_of_an_older_version_replays_bit_for_bit(logs, tmp_path, name, beside):
+    """What it could not say was not there; once all keys of a prediction stood beside it, with a meaning or not."""
+    path = logs(f"former {name}")
+    settings = as_before(strict_yaml.loads(read_log(path).attachments[RESOLVED][1]).data, beside)
+    attachments = {RESOLVED: ("application/yaml", strict_yaml.dumps(settings).encode())}
+    assert replay(rewritten(path, tmp_path / "old.mcap", attachments=attachments)).status == "identical"
 
 
 def test_the_variants_are_what_they_claim(logs):
