@@ -1,5 +1,7 @@
 """Verbs about files: what they print where, and their exit codes."""
 
+from __future__ import annotations
+
 import json
 import os
 import subprocess
