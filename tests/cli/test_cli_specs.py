@@ -103,6 +103,7 @@ def test_new_leaves_no_file_behind_when_it_fails(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [["schema"], ["schema", "--robot"]])
 def test_the_schema_knows_the_keys_and_units_of_every_shipped_file(
     arguments: list[str], capsys: Output
