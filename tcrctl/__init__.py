@@ -32,4 +32,6 @@ follows from that kind of module is in :mod:`tcrctl.robot.module` and nowhere el
 Equation numbers refer to the paper, key [TCR] in REFERENCES.md.
 """
 
+from __future__ import annotations
+
 __version__ = "0.1.0"

@@ -1,5 +1,7 @@
 """Verbs about files: what they print where, and their exit codes."""
 
+from __future__ import annotations
+
 import json
 import os
 import subprocess
@@ -101,6 +103,7 @@ def test_new_leaves_no_file_behind_when_it_fails(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [["schema"], ["schema", "--robot"]])
 def test_the_schema_knows_the_keys_and_units_of_every_shipped_file(
     arguments: list[str], capsys: Output

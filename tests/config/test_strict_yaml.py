@@ -1,5 +1,7 @@
 """Strict YAML: what scalars mean, where problems are reported, what --set does."""
 
+from __future__ import annotations
+
 import math
 from typing import Annotated, Literal
 

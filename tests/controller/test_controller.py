@@ -164,6 +164,7 @@ def test_quick_changes_of_speed_pump_up_modes_that_the_model_does_not_know(tcr70
     assert errors[-20:].max() > 2.0 * errors[40:60].max()
 
 
+@pytest.mark.slow
 def test_without_integral_and_offset_a_mismatched_plant_keeps_an_error(tcr600):
     """The laws above would be empty if feedback alone removed the error."""
     mismatch = Mismatch(springs_youngs_modulus=0.7, density=1.2)
@@ -171,6 +172,7 @@ def test_without_integral_and_offset_a_mismatched_plant_keeps_an_error(tcr600):
     assert np.mean(errors[-20:]) > 1e-3
 
 
+@pytest.mark.slow
 @given(st.integers(1, 60), st.integers(1, 12))
 @hypothesis_settings(deadline=None)
 def test_blocks_cover_the_horizon_without_gaps(instants, blocks):

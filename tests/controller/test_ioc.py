@@ -101,6 +101,7 @@ def test_no_move_lowers_the_cost_with_soft_tension_rows(seed):
             assert cost(case, other) >= best - 0.5 / case[5].softness * 48 * TENSION_SLACK**2
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 @settings(max_examples=50, deadline=None)
 def test_a_harder_floor_never_leaves_more_slack(seed):

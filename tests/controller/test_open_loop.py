@@ -1,5 +1,7 @@
 """Given drive lengths: the table, the end poses that go with it, and the controller that follows it."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from hypothesis import given

@@ -41,6 +41,7 @@ def watch(
         applied = plant.write(Command(u, measured.drive + PERIOD * u))
 
 
+@pytest.mark.slow
 def test_with_the_right_model_and_no_noise_it_follows_the_truth(tcr700):
     for truth, estimate, _ in watch(tcr700, 3.0):
         assert estimate.converged

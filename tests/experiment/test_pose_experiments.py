@@ -1,5 +1,7 @@
 """What the shipped experiments of the two-segment robot promise: times and poses of the paper."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -478,6 +478,7 @@ def test_a_killed_run_keeps_all_steps_but_those_of_the_last_flush_interval(runni
     assert replay(mended.path).status == "identical"
 
 
+@pytest.mark.slow
 def test_paced_steps_begin_a_period_apart(running):
     log = read_log(once_running(running["term"][1]))
     columns = log.columns(["timing_lateness"])

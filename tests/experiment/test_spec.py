@@ -1,5 +1,7 @@
 """Experiment files: shipped ones are valid, contradictions are refused where they stand."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 

@@ -12,6 +12,7 @@ from tcrctl.loop.quiet import quiet_interpreter
 from tcrctl.plant.rig.journal import Journal
 
 
+@pytest.mark.slow
 def test_the_garbage_collector_rests_inside_and_works_again_after():
     assert gc.isenabled()
     with quiet_interpreter(None, pytest.fail):

@@ -57,6 +57,7 @@ def test_pushes_at_the_same_time_add_up(tcr5x4):
     assert more.sum() == pytest.approx(0.3)
 
 
+@pytest.mark.slow
 def test_a_pushed_robot_comes_to_rest_where_statics_says(tcr5x4):
     push = {"ring": 5, "force_n": (0.05, 0.0, 0.0), "start_s": 0.0, "duration_s": 1e6}
     plant = build(tcr5x4, pushes=(push,), step_ms=5.0)

@@ -174,6 +174,7 @@ def test_thinning_out_keeps_every_peak_and_mark():
     assert packing.bundled(few) is few
 
 
+@pytest.mark.slow
 def test_the_page_of_a_long_run_is_small(page):
     """Ten minutes at 100 Hz."""
     (short,) = read_histories([page.parent])

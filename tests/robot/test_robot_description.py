@@ -1,5 +1,7 @@
 """Robot files: what they mean in SI units, and what is refused."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 

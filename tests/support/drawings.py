@@ -1,5 +1,7 @@
 """Drawings to test with: small ones by hand, random ones by hypothesis."""
 
+from __future__ import annotations
+
 import cmath
 import itertools
 import json

@@ -1,5 +1,7 @@
 """A ray through a bore, against a ray that is followed in small steps."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Distances to plates with holes, against dense sampling of segment and plate."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

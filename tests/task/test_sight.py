@@ -1,5 +1,7 @@
 """What a camera sees, against rays to points of the balls."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

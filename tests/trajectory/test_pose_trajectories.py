@@ -1,5 +1,7 @@
 """Laws of the trajectories that command an orientation: waypoints, revolution, scan."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

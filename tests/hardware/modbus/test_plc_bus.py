@@ -159,6 +159,7 @@ def test_a_site_may_have_its_own_addresses_and_formats(wire):
             assert all(position % 10 == 0 for position in status.positions_um)
 
 
+@pytest.mark.slow
 def test_a_plc_without_function_23_is_found_out_at_the_first_exchange(plc, wire):
     plc.faults.set("exception", code=1, function=23)
     with PlcBus(settings_for(plc, wire)) as bus:
@@ -253,6 +254,7 @@ def test_a_single_bad_answer_is_survived_by_one_retry_of_the_same_set(plc, wire,
         assert settle(bus, (100,) * 6, FOLLOW).positions_um == pytest.approx((100,) * 6, abs=20)
 
 
+@pytest.mark.slow
 def test_a_silent_plc_is_noticed_within_the_time_of_its_attempts(plc, wire):
     with PlcBus(settings_for(plc, wire, timeout_s=0.06)) as bus:
         bus.exchange(STILL, Control.RUN, SPEED)

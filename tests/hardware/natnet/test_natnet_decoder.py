@@ -300,6 +300,7 @@ def test_a_mutated_packet_is_read_or_refused_and_nothing_else(data, version):
         decode_frame(bytes(payload), Version(*version))
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(payload=st.binary(max_size=600), version=st.sampled_from(VERSIONS))
 def test_random_bytes_are_refused(payload, version):
@@ -395,6 +396,7 @@ def test_an_unknown_description_is_skipped_if_its_size_is_told():
         decode_models(wire.models_payload((4, 0), [(9, b"?" * 17), known]), Version(4, 0))
 
 
+@pytest.mark.slow
 def test_the_largest_definitions_stay_within_a_megabyte():
     names = [f"{k:02x}" for k in range(256)] * 80
     for version in ((2, 9), (4, 1)):
