@@ -16,6 +16,7 @@ from tcrctl.cli.options import AsJson
 if TYPE_CHECKING:
     from tcrctl.emulate.bench import EmulatedBench
     from tcrctl.emulate.fault_script import FaultScript
+    from tcrctl.emulate.settings import EmulationSettings
 
 
 def emulate(
@@ -28,6 +29,13 @@ def emulate(
     perfect: Annotated[
         bool, typer.Option("--perfect", help="Robots exactly as the controller's model; no marker noise.")
     ] = False,
+    realistic: Annotated[
+        str,
+        typer.Option("--realistic", metavar="LEVEL", help="off, mild, moderate or severe: docs/reality.md."),
+    ] = "off",
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="Seed of noise and of what --realistic draws.")
+    ] = 0,
     rate_hz: Annotated[
         float, typer.Option("--rate-hz", min=10, max=1000, help="Camera frames per second.")
     ] = 240.0,
@@ -42,18 +50,21 @@ def emulate(
     """Emulate cameras, PLCs and robots of a rig file; then run experiments on it from another terminal.
 
     The robots are those of the shipped experiments: springs 30 % softer and density 20 % higher than the
-    controller believes, 50 um of marker noise. With --json, one object with counts at the end.
+    controller believes, 50 um of marker noise. --realistic adds friction, unlike parts, imperfect drives,
+    cables and cameras. With --json, one object with counts at the end.
 
     Examples:
       tcrctl emulate
       tcrctl run letter_t --set plant.kind=rig --set plant.rig=loopback --yes    (in another terminal)
       tcrctl emulate --faults estop.yaml
+      tcrctl emulate --realistic moderate --seed 7
     """
     from tcrctl.errors import RunInterruptedError
     from tcrctl.loop.interruption import Interruption, signals_exit
 
     with signals_exit():
-        bench, script = _built(rig, faults, perfect, rate_hz, watchdog_ms)
+        settings = _settings(perfect=perfect, realistic=realistic, seed=seed)
+        bench, script = _built(rig, faults, replace(settings, rate=rate_hz, watchdog_ms=watchdog_ms))
     from tcrctl.emulate.bench import emulate as keep_going
 
     with Interruption() as interruption, bench:
@@ -73,19 +84,27 @@ def emulate(
         print(json.dumps({"status": "ok", **result}))
 
 
+def _settings(*, perfect: bool, realistic: str, seed: int) -> EmulationSettings:
+    from tcrctl.emulate.settings import EmulationSettings
+    from tcrctl.errors import InputError
+    from tcrctl.plant.realistic import LEVELS
+
+    if realistic not in ("off", *LEVELS):
+        raise InputError(f"--realistic must be off, {', '.join(LEVELS)}, not {realistic}")
+    settings = EmulationSettings(realistic=realistic, seed=seed)  # type: ignore[arg-type]  # checked above
+    return replace(settings, mismatch=None, noise=1e-9) if perfect else settings
+
+
 def _built(
-    rig: str, faults: Path | None, perfect: bool, rate_hz: float, watchdog_ms: int
+    rig: str, faults: Path | None, settings: EmulationSettings
 ) -> tuple[EmulatedBench, FaultScript | None]:
-    from tcrctl.emulate.bench import EmulatedBench, EmulationSettings, marker_names
+    from tcrctl.emulate.bench import EmulatedBench, marker_names
     from tcrctl.emulate.fault_script import load_fault_script
     from tcrctl.experiment.compilation import announced_compilation
     from tcrctl.plant.rig.file import read_rig
 
     file, *_ = read_rig(rig)
     script = None if faults is None else load_fault_script(faults, file.robots, marker_names(file))
-    settings = EmulationSettings(rate=rate_hz, watchdog_ms=watchdog_ms)
-    if perfect:
-        settings = replace(settings, mismatch=None, noise=1e-9)
     with announced_compilation(lambda: _say("compiling numerical kernels (first run only) ...")):
         return EmulatedBench(file, settings), script
 
