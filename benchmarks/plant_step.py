@@ -2,8 +2,9 @@
 
     python benchmarks/plant_step.py [--seconds 5] [--step-ms 1] [--friction 0.1]
 
-The drives swing by 20 mm, out of phase, once in 5 s; without and with friction in the cable holes. Also compared: the structured solve of one Newton step (factor
-K, couple the cables, solve) with a dense solve by numpy of the same matrix.
+The drives swing by 20 mm, out of phase, once in 5 s; without and with friction in the cable holes, and as the whole
+simulated plant with everything that ``plant.realistic: moderate`` draws. Also compared: the structured solve of one
+Newton step (factor K, couple the cables, solve) with a dense solve by numpy of the same matrix.
 """
 
 from __future__ import annotations
@@ -21,13 +22,16 @@ from rich.console import Console
 from rich.table import Table
 
 from tcrctl.numerics import block_banded
+from tcrctl.plant.realistic import as_drawn
+from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import dynamics, linear
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.equations import FORCE, Load, assemble, make_workspace
 from tcrctl.robot.module import FIXED
 from tcrctl.robot.robot import Robot, build_robot, hole_friction
 from tcrctl.robot.sections import FrictionSettings
-from tcrctl.signals import Array
+from tcrctl.signals import Array, Command
 
 RHO = 0.8
 PERIOD, REACH = 5.0, 0.02
@@ -59,6 +63,19 @@ def run(robot: Robot, seconds: float, step: float, friction: float | None = None
         if not done[0]:
             raise SystemExit(f"step {k} did not converge")
     return np.array(times), np.array(iterations)
+
+
+def realistic(robot: Robot, seconds: float, step: float) -> float:
+    """Wall time of a step [us] of a plant that is all of *moderate*, its periods of 50 ms as a whole."""
+    ideal = SimulatedSettings(kind="simulated", step_ms=1e3 * step, realistic="moderate", scatter=None)
+    plant = SimulatedPlant(as_drawn(ideal, robot.n_cables, 1), robot, 0.05, 1)
+    times = []
+    for k in range(round(seconds / 0.05)):
+        command = Command(speeds(0.05 * k, robot.n_cables), np.zeros(robot.n_cables))
+        begin = time.perf_counter()
+        plant.write(command)
+        times.append(1e6 * (time.perf_counter() - begin) * step / 0.05)
+    return float(np.median(times))
 
 
 def solves(robot: Robot, step: float, repeats: int = 300) -> tuple[float, float, float]:
@@ -107,6 +124,7 @@ def main() -> None:
     table.add_row(f"step p50 with friction {given.friction:g}", f"{np.median(rubbing):.1f}", "us")
     table.add_row("with / without friction", f"{np.median(rubbing) / np.median(times):.2f}", "1")
     table.add_row("Newton iterations with friction, mean", f"{rubbing_iterations.mean():.2f}", "1")
+    table.add_row("step p50, realistic: moderate", f"{realistic(robot, given.seconds, step):.1f}", "us")
     table.add_row("structured solve", f"{structured:.1f}", "us")
     table.add_row("dense solve (numpy)", f"{dense:.1f}", "us")
     table.add_row("dense / structured", f"{dense / structured:.1f}", "1")

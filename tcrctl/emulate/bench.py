@@ -14,7 +14,6 @@ import errno
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -27,19 +26,18 @@ from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.rigid_transform import RigidTransform
 from tcrctl.emulate.fault_script import FaultScript, Player
+from tcrctl.emulate.imperfections import Imperfections
 from tcrctl.emulate.robot import EmulatedRobot
+from tcrctl.emulate.settings import EmulationSettings
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.natnet_cameras import transform
 from tcrctl.plant.rig.settings import CableDrive, ModbusTcp, MountedRobot, RigFile
-from tcrctl.plant.settings import Mismatch
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.signals import Array
 
 #: The PLC's limits are wider than the soft limits of the rig file by this [um].
 MARGIN: Final = 5000
-#: That of the shipped experiments.
-SHIPPED_MISMATCH: Final = Mismatch(springs_youngs_modulus=0.7, density=1.2)
 #: How often the fault script looks at the time, and the main thread at the signals [s].
 TICK: Final = 0.005
 #: What to do if the port of the cameras cannot be had.
@@ -47,29 +45,6 @@ HINTS: Final = {
     errno.EADDRINUSE: "Is another tcrctl emulate running?",
     errno.EACCES: "Ports below 1024 need privileges.",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class EmulationSettings:
-    """How the emulated bench differs from a perfect one.
-
-    Attributes:
-        mismatch: By what the robots differ from the controller's model; None for not at all.
-        noise: Standard deviation of every marker coordinate [m].
-        rate: Camera frames per second [Hz].
-        version: Newest NatNet version of the server.
-        watchdog_ms: Watchdog of the PLCs [ms].
-        seed: Seed of everything random.
-        unicast_to: Where frames go in unicast: ``sender`` of the request or the ``data_port``.
-    """
-
-    mismatch: Mismatch | None = SHIPPED_MISMATCH
-    noise: float = 50e-6
-    rate: float = 240.0
-    version: str = "4.1"
-    watchdog_ms: int = 200
-    seed: int = 0
-    unicast_to: str = "sender"
 
 
 class EmulatedBench:
@@ -100,16 +75,20 @@ class EmulatedBench:
         self._failure: Exception | None = None
         self.plcs: dict[str, PlcEmulator] = {}
         self.robots: dict[str, EmulatedRobot] = {}
+        self._real: dict[str, Imperfections] = {}
         self._back: dict[str, RigidTransform] = {}
         names: list[str] = []
         for name, mounted in rig.robots.items():
             robot = built[name] if name in built else build_robot(load_robot(name))
-            self.plcs[name] = PlcEmulator(_plc_settings(mounted, settings))
-            self.robots[name] = self._moved(name, mounted, robot)
+            real = Imperfections(name, robot, settings.mismatch, settings.realistic, settings.seed)
+            self.plcs[name] = PlcEmulator(_plc_settings(mounted, settings, real))
+            self.robots[name] = self._moved(name, mounted, real)
+            self._real[name] = real
             self._back[name] = transform(mounted.calibration)
             names += _labels(mounted, robot.n_modules)
         try:
             self.motive = MotiveEmulator(names, self._markers, _motive_settings(rig, settings))
+            self.motive.faults.loss = max(real.lost_frames for real in self._real.values())
         except OSError as error:
             where = f"{rig.cameras.server}:{rig.cameras.command_port}"
             hint = HINTS.get(error.errno or 0, "Only addresses of this computer can be emulated.")
@@ -118,9 +97,9 @@ class EmulatedBench:
             ) from error
         self._opened = ExitStack()
 
-    def _moved(self, name: str, mounted: MountedRobot, robot: Robot) -> EmulatedRobot:
+    def _moved(self, name: str, mounted: MountedRobot, real: Imperfections) -> EmulatedRobot:
         plc = self.plcs[name]
-        cables = [mounted.cables[cable] for cable in robot.cable_names]
+        cables = [mounted.cables[cable] for cable in real.robot.cable_names]
         axes = len(plc.positions_um())
 
         def drives() -> list[float]:
@@ -133,17 +112,24 @@ class EmulatedBench:
                 felt[cable.axis - 1] = newton
             plc.set_tensions(felt)
 
-        return EmulatedRobot(robot, self._settings.mismatch, drives, tensions)
+        return EmulatedRobot(real.robot, real.plant, drives, tensions)
 
     def _markers(self) -> Array:
         """All markers in the frame of the cameras (n, 3) [m]."""
         try:
-            seen = [self._back[name].inverse_apply(robot.rings()) for name, robot in self.robots.items()]
-            exact = np.concatenate(seen)
+            exact = np.concatenate([self._seen(name) for name in self.robots])
         except Exception as error:
             self._failure = error
             raise
-        return np.asarray(exact + self._settings.noise * self._random.standard_normal(exact.shape))
+        noisy = exact + self._settings.noise * self._random.standard_normal(exact.shape)
+        lost = max(real.lost_markers for real in self._real.values())
+        if lost:
+            noisy[self._random.random(len(noisy)) < lost] = np.nan
+        return np.asarray(noisy)
+
+    def _seen(self, name: str) -> Array:
+        """Markers of one robot in the frame of the cameras (3 + 3 n_modules, 3) [m]."""
+        return self._back[name].inverse_apply(self._real[name].markers(self.robots[name].rings()))
 
     def __enter__(self) -> Self:
         """Open all ports.
@@ -256,11 +242,13 @@ def _labels(mounted: MountedRobot, modules: int) -> list[str]:
     return base + [markers.labels.format(ring=ring, node=node) for ring in rings for node in (1, 2, 3)]
 
 
-def _plc_settings(mounted: MountedRobot, settings: EmulationSettings) -> PlcSettings:
+def _plc_settings(mounted: MountedRobot, settings: EmulationSettings, real: Imperfections) -> PlcSettings:
     ranges = [_axis_range(cable) for cable in mounted.cables.values()]
+    axes = max(6, *(cable.axis for cable in mounted.cables.values()))
     return PlcSettings(
-        axes=max(6, *(cable.axis for cable in mounted.cables.values())),
+        axes=axes,
         unit=mounted.plc.unit,
+        servo=real.servos(mounted, axes),
         limits=PlcLimitSettings(
             min_um=min(low for low, _ in ranges) - MARGIN,
             max_um=max(high for _, high in ranges) + MARGIN,

@@ -8,17 +8,15 @@ from typing import Final
 
 import numpy as np
 
-from tcrctl.errors import DivergenceError
-from tcrctl.plant.settings import Mismatch
-from tcrctl.robot import dynamics
-from tcrctl.robot.equations import make_workspace
+from tcrctl.plant.body import Body, relaxes
+from tcrctl.plant.own_robot import moving_robot
+from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.robot.module import ring_nodes, ring_rows
-from tcrctl.robot.robot import Robot, mismatched
+from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
 
 #: Internal time step [s]: twice that of the simulated plant, because this one has to keep up with the clock.
 STEP: Final = 0.002
-RULE: Final = dynamics.Rule(STEP, 0.8)
 #: Time that is made up for at once [s]; on a computer that is too slow the robot moves in slow motion.
 LONGEST_CATCH_UP: Final = 0.02
 #: A robot slower than this, whose drives stand still, is not integrated [m/s]; drives: [m].
@@ -37,7 +35,7 @@ class EmulatedRobot:
     def __init__(
         self,
         robot: Robot,
-        mismatch: Mismatch | None,
+        settings: SimulatedSettings,
         drives: Callable[[], Sequence[float]],
         tensions: Callable[[Sequence[float]], None],
         *,
@@ -46,21 +44,19 @@ class EmulatedRobot:
         """Hang it up at rest.
 
         Args:
-            robot: The robot as the controller knows it.
-            mismatch: By what it differs.
+            robot: The robot as the controller knows it, or a scattered one.
+            settings: By what it differs: material, strings, friction, hysteresis, creep; drives and cameras are not
+                its own.
             drives: Cable lengths taken in now (m,) [m].
             tensions: Takes the cable tensions (m,) [N].
             clock: Never jumps [s].
         """
-        if mismatch is not None:
-            robot = mismatched(
-                robot, mismatch.springs_youngs_modulus, mismatch.cables_youngs_modulus, mismatch.density
-            )
+        robot = moving_robot(settings, robot)
         self.robot, self.slipped = robot, 0.0
         self._drives, self._tensions, self._clock = drives, tensions, clock
-        self._state = dynamics.rest_state(robot.rest.q, np.zeros(robot.n_cables))
-        self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
-        self._work.tension[:] = robot.rest.tension
+        self._cable = np.asarray(drives(), dtype=float)
+        self._body = Body(settings.model_copy(update={"step_ms": 1e3 * STEP}), robot, self._cable)
+        self._relaxes = relaxes(settings)
         self._time = clock()
         self._rings = np.array([*ring_nodes(0), *ring_rows(robot.n_modules)])
 
@@ -71,7 +67,7 @@ class EmulatedRobot:
             DivergenceError: If the simulation broke down.
         """
         self._advance()
-        nodes: Array = self._state.q.reshape(-1, 3)[self._rings]
+        nodes: Array = self._body.state.q.reshape(-1, 3)[self._rings]
         return nodes
 
     def _advance(self) -> None:
@@ -85,17 +81,19 @@ class EmulatedRobot:
             return
         duration = steps * STEP
         self._time += duration
-        target = np.asarray(self._drives(), dtype=float)
-        speed = (target - self._state.drive) / duration
-        if self._still() and np.abs(target - self._state.drive).max() < STILL_DRIVE:
+        before, target = self._cable, np.asarray(self._drives(), dtype=float)
+        if self._still() and np.abs(target - before).max() < STILL_DRIVE:
             return
-        converged, residual, smallest, _ = dynamics.advance(
-            self.robot.model, self._state, speed, duration, RULE, self.robot.weight, self._work, self._scratch
-        )
-        if not converged:
-            raise DivergenceError(self._time, residual, smallest)
-        self._state.drive[:] = target
-        self._tensions(self._work.tension.tolist())
+        self._cable = target
+        if self._relaxes:
+            for i in range(1, steps + 1):
+                cable = before + (target - before) * (i / steps)
+                self._body.follow(cable, STEP, self.robot.weight, self._time)
+        else:
+            drive = self._body.state.drive
+            self._body.advance((target - drive) / duration, duration, self.robot.weight, self._time)
+            drive[:] = target
+        self._tensions(self._body.tension.tolist())
 
     def _still(self) -> bool:
-        return float(np.abs(self._state.v).max()) < STILL_SPEED
+        return float(np.abs(self._body.state.v).max()) < STILL_SPEED

@@ -1,10 +1,12 @@
-"""The moving robot of a simulated plant: arrays, state and integrator."""
+"""The moving robot of a simulated plant: state, integrator, springs that give way and cables that creep."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from tcrctl.elements import sliding_cable
 from tcrctl.errors import DivergenceError
+from tcrctl.plant.creep import Creep
 from tcrctl.plant.own_robot import friction_of
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.spring_hysteresis import SpringHysteresis
@@ -15,6 +17,12 @@ from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
 
 
+def relaxes(settings: SimulatedSettings) -> bool:
+    """Return whether something has to happen to a robot between internal steps."""
+    creeps = settings.cables is not None and bool(settings.cables.creep)
+    return creeps or settings.springs_hysteresis is not None
+
+
 class Body:
     """A robot that starts at rest.
 
@@ -22,7 +30,7 @@ class Body:
         model: Its arrays.
         state: Its state, changed in place.
         tension: Cable tensions at the drives (m,) [N], changed in place.
-        hysteresis: Friction elements of the springs, or None.
+        late: Cable that creep has paid out, as seen from the drives (m,) [m]; with friction it is in the stretches.
     """
 
     def __init__(self, settings: SimulatedSettings, robot: Robot, drive: Array) -> None:
@@ -39,13 +47,16 @@ class Body:
         slip = None if holes is None else dynamics.unworn(robot.model, rest.q, drive, rest.tension, holes)
         self.state = dynamics.rest_state(rest.q, drive, slip)
         loss = settings.springs_hysteresis
-        self.hysteresis = None if loss is None else SpringHysteresis(loss, robot.model, rest.q)
-        self.model = robot.model if self.hysteresis is None else self.hysteresis.model
+        self._hysteresis = None if loss is None else SpringHysteresis(loss, robot.model, rest.q)
+        self.model = robot.model if self._hysteresis is None else self._hysteresis.model
         self._work = make_workspace(self.model, rubbing=slip is not None)
         self._scratch = dynamics.make_scratch(self.model)
         self._scratch.lead[:] = dynamics.lead_direction(rest.q)
         self.tension = self._work.tension
         self.tension[:] = rest.tension
+        self.late = np.zeros_like(drive)
+        branches = () if settings.cables is None else settings.cables.creep
+        self._creep = Creep(branches, self._elastic()) if branches else None
 
     def advance(self, speed: Array, duration: float, force: Array, t: float) -> None:
         """Let time pass.
@@ -64,3 +75,26 @@ class Body:
         )
         if not converged:
             raise DivergenceError(t, residual, smallest)
+
+    def follow(self, cable: Array, h: float, force: Array, t: float) -> None:
+        """One internal step ``h`` [s] to the cable taken in at its end (m,) [m], and what slowly follows.
+
+        Raises:
+            DivergenceError: If it did not converge.
+        """
+        self.advance((cable - self.late - self.state.drive) / h, h, force, t)
+        if self._hysteresis is not None:
+            self._hysteresis.give_way(self.state.q)
+        if self._creep is not None:
+            grown, slip = self._creep.step(self._elastic(), h), self.state.slip
+            if slip is None:
+                self.late += grown
+            else:
+                slip.rest[:] += grown
+
+    def _elastic(self) -> Array:
+        """Elastic elongations of the cables (m,) or, where they rub, of their stretches (n_holes,) [m]."""
+        slip = self.state.slip
+        if slip is None:
+            return np.asarray(self.tension / self.model.cables[:, sliding_cable.STIFFNESS])
+        return np.asarray(slip.tension / slip.stiffness)

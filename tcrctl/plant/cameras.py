@@ -66,6 +66,17 @@ class CameraDraw(NamedTuple):
     rotation: Array
     translation: Array
 
+    def beside(self, nodes: Array) -> Array:
+        """Return the markers (n_markers, 3) of ring nodes (n_markers, 3) [m]."""
+        axes = np.repeat(ring_frames(nodes), RING, axis=0)
+        return np.asarray(nodes + np.einsum("ni,nij->nj", self.bias, axes))
+
+    def in_frame(self, markers: Array) -> Array:
+        """Return markers (n, 3) in the frame that the cameras take for that of the robot [m]."""
+        return np.asarray(
+            markers @ matrix_from_quaternion(quaternion_exp(self.rotation)).T + self.translation
+        )
+
 
 def draw_cameras(settings: CameraSettings, markers: int, seed: int) -> CameraDraw:
     """Draw what stays; ``seed`` counts if the settings have none."""
@@ -94,7 +105,6 @@ class ImperfectCameras:
         self._random = np.random.default_rng([_seed(settings, seed), 1])
         self._settings, self._latency, self._noise = settings, latency, noise
         self.draw = draw_cameras(settings, markers, seed)
-        self._turn = matrix_from_quaternion(quaternion_exp(self.draw.rotation))
         self._shapes: deque[tuple[float, Array]] = deque()
         self._markers, self._last = markers, Frame(0.0, np.zeros((markers, 3)), np.zeros(markers, np.bool_))
         self._coming, self._arrival, self._newest = 0, latency + self._late(), 0.0
@@ -154,9 +164,7 @@ class ImperfectCameras:
 
     def _reported(self, nodes: Array) -> Array:
         """Markers in the frame that the cameras take for that of the robot (n_markers, 3) [m]."""
-        axes = np.repeat(ring_frames(nodes), RING, axis=0)
-        markers = nodes + np.einsum("ni,nij->nj", self.draw.bias, axes)
-        markers = markers @ self._turn.T + self.draw.translation
+        markers = self.draw.in_frame(self.draw.beside(nodes))
         markers = markers + self._noise * self._random.standard_normal(markers.shape)
         wild = self._random.random(self._markers) < self._settings.outliers.share
         away = 1e-3 * self._settings.outliers.size_mm * directions(self._random, self._markers)

@@ -12,6 +12,7 @@ drive does not depend on the step.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +22,23 @@ from tcrctl.signals import Array
 
 #: Micrometres per metre.
 UM = 1e6
+
+
+def servo_settings(settings: DriveSettings, count: int) -> tuple[ServoSettings, ...]:
+    """Return the behaviour of so many drives, one per cable."""
+    limit = settings.acceleration_limit_mm_s2
+    alike = ServoSettings(
+        lag_s=settings.lag_s,
+        acceleration_um_s2=math.inf if limit is None else 1e3 * limit,
+        backlash_um=1e3 * settings.backlash_mm,
+        dead_time_s=settings.dead_time_s,
+        count_um=1e3 * settings.quantisation_mm,
+    )
+    radius = np.broadcast_to(settings.radius_error, count).tolist()
+    zero = np.broadcast_to(settings.zero_error_mm, count).tolist()
+    return tuple(
+        replace(alike, radius_error=r, zero_error_um=1e3 * z) for r, z in zip(radius, zero, strict=True)
+    )
 
 
 class SimulatedDrives:
@@ -36,24 +54,9 @@ class SimulatedDrives:
         lag, keep = settings.lag_s, math.exp(-step / settings.lag_s) if settings.lag_s > 0.0 else 0.0
         sampled = step / (1.0 - keep)
         self._step, self._ahead = step, sampled - lag
-        radius = np.broadcast_to(settings.radius_error, start.shape)
-        zero = np.broadcast_to(settings.zero_error_mm, start.shape)
-        limit = settings.acceleration_limit_mm_s2
         self._servos = [
-            Servo(
-                ServoSettings(
-                    lag_s=sampled,
-                    speed_um_s=math.inf,
-                    acceleration_um_s2=math.inf if limit is None else 1e3 * limit,
-                    backlash_um=1e3 * settings.backlash_mm,
-                    dead_time_s=settings.dead_time_s,
-                    count_um=1e3 * settings.quantisation_mm,
-                    radius_error=float(radius[c]),
-                    zero_error_um=1e3 * float(zero[c]),
-                ),
-                UM * float(start[c]),
-            )
-            for c in range(start.size)
+            Servo(replace(servo, lag_s=sampled, speed_um_s=math.inf), UM * float(start[c]))
+            for c, servo in enumerate(servo_settings(settings, start.size))
         ]
         self.set_point = start.copy()
 

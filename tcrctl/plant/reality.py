@@ -1,6 +1,6 @@
 """A control period of a plant with real drives, cables, springs and cameras, one internal step after the other.
 
-    set-points -> drives -> cable taken in - late elongation -> robot -> springs give way, cables creep -> cameras
+    set-points -> drives -> cable taken in -> robot, whose springs give way and whose cables creep -> cameras
 """  # fmt: skip
 
 from __future__ import annotations
@@ -8,12 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.elements import sliding_cable
-from tcrctl.plant.body import Body
+from tcrctl.plant.body import Body, relaxes
 from tcrctl.plant.cameras import ImperfectCameras
-from tcrctl.plant.creep import Creep
 from tcrctl.plant.drives import SimulatedDrives
-from tcrctl.plant.reality_settings import CableEffects, CameraSettings, DriveSettings
+from tcrctl.plant.reality_settings import CameraSettings, DriveSettings
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.signals import Array
 
@@ -23,13 +21,7 @@ IDEAL_DRIVES = DriveSettings(reports="set_point")
 
 def steps_one_by_one(settings: SimulatedSettings) -> bool:
     """Return whether a plant has something that happens between internal steps."""
-    cables = settings.cables
-    return (
-        settings.drives is not None
-        or settings.springs_hysteresis is not None
-        or settings.cameras is not None
-        or (cables is not None and bool(cables.creep))
-    )
+    return relaxes(settings) or settings.drives is not None or settings.cameras is not None
 
 
 def real_drives(settings: SimulatedSettings, start: Array, period: float) -> SimulatedDrives:
@@ -79,8 +71,6 @@ class Reality:
             settings.noise_um * 1e-6,
             seed,
         )
-        self._late = np.zeros_like(body.state.drive)
-        self._creep = Creep((settings.cables or CableEffects()).creep, self._elastic())
         self._watch(0.0)
 
     def period(self, speed: Array, force: Array, t: float) -> None:
@@ -94,30 +84,10 @@ class Reality:
         Raises:
             DivergenceError: If a time step did not converge.
         """
-        body, h = self._body, self._step
+        h = self._step
         for i in range(self._count):
-            wanted = self.drives.move(speed) - self._late
-            body.advance((wanted - body.state.drive) / h, h, force, t + i * h)
-            if body.hysteresis is not None:
-                body.hysteresis.give_way(body.state.q)
-            self._let_creep()
+            self._body.follow(self.drives.move(speed), h, force, t + i * h)
             self._watch(t + (i + 1) * h)
-
-    def _elastic(self) -> Array:
-        """Elastic elongations of the cables (m,) or, where they rub, of their stretches (n_holes,) [m]."""
-        slip, body = self._body.state.slip, self._body
-        if slip is None:
-            return np.asarray(body.tension / body.model.cables[:, sliding_cable.STIFFNESS])
-        return np.asarray(slip.tension / slip.stiffness)
-
-    def _let_creep(self) -> None:
-        """What comes late makes a cable longer: without friction as if its drive had paid it out."""
-        grown = self._creep.step(self._elastic(), self._step)
-        slip = self._body.state.slip
-        if slip is None:
-            self._late += grown
-        else:
-            slip.rest[:] += grown
 
     def _watch(self, t: float) -> None:
         self.cameras.watch(t, self._body.state.q.reshape(-1, 3)[self._rows])

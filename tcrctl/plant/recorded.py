@@ -47,9 +47,18 @@ class Recorded:
     step: StepRecord
     limited: Command | None
 
-    def __init__(self, steps: Iterator[StepRecord], limits: Limits | None) -> None:
-        """Take the steps of a log, and the limits of the plant that was recorded if they are known."""
+    def __init__(
+        self, steps: Iterator[StepRecord], limits: Limits | None, *, reports_set_points: bool = True
+    ) -> None:
+        """Take the steps of a log.
+
+        Args:
+            steps: From the first one on.
+            limits: Those of the plant that was recorded if they are known.
+            reports_set_points: Its drives were measured to be where they should be.
+        """
         self._steps, self._limits, self._next_k, self.limited = steps, limits, 0, None
+        self._reports_set_points = reports_set_points
         self._set_point: Array | None = None
 
     def read(self) -> Measurement:
@@ -62,8 +71,8 @@ class Recorded:
         step = next(self._steps, None)
         if step is None or step.k != self._next_k:
             raise RecordingEndedError(self._next_k, None if step is None else step.k)
-        before = None if self._next_k == 0 else self.step.applied.drive
-        self._set_point = step.measurement.drive if before is None else before
+        measured = self._next_k == 0 or self._reports_set_points
+        self._set_point = step.measurement.drive if measured else self.step.applied.drive
         self.step, self._next_k = step, self._next_k + 1
         return step.measurement
 

@@ -68,6 +68,11 @@ class SimulatedPlant:
             [self._body.state.q.copy()], maxlen=whole + 1
         )  # oldest first: shapes as cameras saw them
 
+    @property
+    def smooth(self) -> bool:
+        """Whether :meth:`memory` is all that its next step depends on, and that step is a smooth map."""
+        return self.reality is None and self._body.state.slip is None
+
     def start(self) -> None:
         """Nothing to arm in simulation."""
 

@@ -24,6 +24,7 @@ from tcrctl.log.reader import Log, read_log
 from tcrctl.loop.loop import Parts, tick
 from tcrctl.loop.safety import NO_LIMITS, SafetyGuard
 from tcrctl.plant.recorded import Limits, Recorded, RecordingEndedError
+from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.plant.stroke import within_stroke
 from tcrctl.replay.environment import Change, changes
 from tcrctl.replay.rebuild import Origin, rebuild
@@ -110,11 +111,12 @@ class _Session:
         self._log, self._origin, self._window = log, origin, window
         self._kind, self._period = spec.plant.kind, float(spec.controller.period_s)
         self.robot = build_robot(origin.wanted.robot)
+        reports = _reports_set_points(origin.recorded.spec.plant)
         limits = LIMITS[self._kind](self.robot, self._period) if self._kind in LIMITS else None
         unknown = () if limits is not None else ("applied.",)
         self._comparison = Comparison(quantities(*GIVEN, *unknown), tolerance.atol, tolerance.rtol)
         self._steps, first = _peeked(log.steps())
-        self._plant = Recorded(self._steps, limits)
+        self._plant = Recorded(self._steps, limits, reports_set_points=reports)
         self._controller = build_controller(spec.controller, self.robot)
         self._estimator = build_estimator(spec.estimator, self.robot, self._period, self._plant.state)
         self._trajectory = self._references(first)
@@ -226,6 +228,12 @@ class _Session:
         if self._kind in LIMITS:
             return ()
         return (f"applied: the limits of plant.kind: {self._kind} are not known here",)
+
+
+def _reports_set_points(plant: PlantSettings) -> bool:
+    """Return whether the drives of a recorded plant were measured to be where they should be."""
+    drives = plant.drives if isinstance(plant, SimulatedSettings) else None
+    return drives is None or drives.reports == "set_point"
 
 
 def _peeked(steps: Iterator[StepRecord]) -> tuple[Iterator[StepRecord], StepRecord | None]:

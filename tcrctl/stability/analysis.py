@@ -75,13 +75,18 @@ def analyse(
         The report; also of a run that was stopped by a limit, up to there.
 
     Raises:
-        InputError: If the plant is not simulated.
+        InputError: If the plant is not simulated, or has friction, play or the like.
         RunInterruptedError: If a signal asked to stop.
     """
     plant, state = build_plant(experiment)
     if not isinstance(plant, SimulatedPlant):
         plant.close()
         raise InputError("the stability analysis needs plant.kind: simulated; a robot cannot be copied")
+    if not plant.smooth:
+        raise InputError(
+            "the stability analysis needs a plant that can be linearised",
+            hint="Leave out plant.friction, drives, springs_hysteresis, cameras, realistic and the cables' creep.",
+        )
     plant.without_noise()
     parts, _ = build_parts(experiment, plant, state)
     linearisable(parts.controller).sharpen()

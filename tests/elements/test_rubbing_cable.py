@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import daqp
 import numpy as np
 import pytest
@@ -134,7 +136,7 @@ def cycle(chain, amplitude, count):
     ramp = np.linspace(0.0, 1.0, count // 4, endpoint=False)
     way = amplitude * np.concatenate([ramp, 1.0 - ramp, -ramp, ramp - 1.0, [0.0]])
     work, before = 0.0, chain.tension[0]
-    for a, b in zip(way[:-1], way[1:], strict=True):
+    for a, b in itertools.pairwise(way):
         chain.step(b)
         work += 0.5 * (before + chain.tension[0]) * (b - a)
         before = chain.tension[0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -92,7 +94,7 @@ def test_lost_markers_are_that_share_and_independent():
 def test_a_lost_frame_is_the_last_one_again_with_its_time():
     frames = moving(build(lost_frames=0.3), 300)
     lost = 0
-    for before, after in zip(frames[:-1], frames[1:], strict=True):
+    for before, after in itertools.pairwise(frames):
         if after.t == before.t:
             lost += 1
             assert after.nodes is before.nodes

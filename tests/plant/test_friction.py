@@ -132,7 +132,7 @@ def test_forces_and_tangent_derive_from_the_potential_where_some_holes_stick_and
 def loop(robot, mu, step_ms, amplitude=0.015):
     """Area of the loop of a cable's tension over its drive in the second of two slow cycles [J]."""
     plant, area = build(robot, mu, step_ms), 0.0
-    for cycle in range(2):
+    for _cycle in range(2):
         area = 0.0
         for side in (1.0, -1.0, -1.0, 1.0):
             for _ in range(20):

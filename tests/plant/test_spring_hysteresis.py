@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -40,7 +42,7 @@ def force(element, q):
 
 def passed(element, shape, ways, count=400):
     """Stretches, forces, and energy lost on a way through ``ways`` [m]."""
-    x = np.concatenate([np.linspace(a, b, count) for a, b in zip(ways[:-1], ways[1:], strict=True)])
+    x = np.concatenate([np.linspace(a, b, count) for a, b in itertools.pairwise(ways)])
     forces, lost = [], 0.0
     for stretch in x:
         lost += element.give_way(shape(stretch))

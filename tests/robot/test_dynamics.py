@@ -49,7 +49,7 @@ class Motion:
         other.__dict__.update(self.__dict__)
         x = self.state
         other.state = dynamics.State(
-            x.q.copy(), x.v.copy(), x.acceleration.copy(), x.acceleration.copy(), x.drive.copy()
+            x.q.copy(), x.v.copy(), x.acceleration.copy(), x.acceleration.copy(), x.drive.copy(), None
         )
         other.rho = rho
         return other

@@ -44,7 +44,7 @@ class PlcSettings:
         zeroed: Whether it knows the zero of its positions at the start.
         low_word_first: Order of the words of 32-bit registers.
         limits: What its program enforces.
-        servo: Its drives.
+        servo: Its drives, all alike or one by one.
         map: Its registers; for another number of axes the default is ``register_map(axes)``.
     """
 
@@ -54,7 +54,7 @@ class PlcSettings:
     zeroed: bool = True
     low_word_first: bool = False
     limits: PlcLimitSettings = field(default_factory=PlcLimitSettings)
-    servo: ServoSettings = field(default_factory=ServoSettings)
+    servo: ServoSettings | tuple[ServoSettings, ...] = field(default_factory=ServoSettings)
     map: RegisterMap | None = None
 
 

@@ -86,10 +86,18 @@ class PlcProgram:
         active: Set-points that the drives follow (axes,) [um].
     """
 
-    def __init__(self, axes: int, limits: PlcLimitSettings, servo: ServoSettings, *, zeroed: bool) -> None:
+    def __init__(
+        self,
+        axes: int,
+        limits: PlcLimitSettings,
+        servo: ServoSettings | Sequence[ServoSettings],
+        *,
+        zeroed: bool,
+    ) -> None:
         """Power up with all drives at rest at 0."""
         self._limits = limits
-        self.servos = [Servo(servo) for _ in range(axes)]
+        drives = [servo] * axes if isinstance(servo, ServoSettings) else servo
+        self.servos = [Servo(drive) for drive in drives]
         self.estop = self.drive_lost = False
         self._origin = [0.0] * axes
         self.power_up()
