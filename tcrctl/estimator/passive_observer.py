@@ -81,7 +81,7 @@ class PassiveObserver:
             self._frame[:] = np.where(measured.valid[:, None], measured.nodes, 0.0)
             self._frame_valid = measured.valid.copy()
         elif self._holds and self._frame_valid.any():
-            return replace(measured, nodes=self._frame.copy(), valid=self._frame_valid)
+            return replace(measured, nodes=self._frame.astype(measured.nodes.dtype), valid=self._frame_valid)
         return measured
 
     def _fit(self, measured: Measurement) -> None:

@@ -63,7 +63,7 @@ def _modules(
         entry = given.get(module, ModuleDifference(module=module))
         moved = scatter.geometry_mm * geometry.standard_normal((len(LABELS), 3))
         offsets: dict[Any, Any] = {
-            label: tuple((np.array(entry.offsets_mm.get(label, (0.0, 0.0, 0.0))) + by).tolist())
+            label: tuple((np.array(entry.offsets_mm.get(label, (0.0, 0.0, 0.0))) + by).tolist())  # type: ignore[call-overload]
             for label, by in zip(LABELS, moved, strict=True)
         }
         mass = robot.modules.of(module).mass_g * _factor(masses, scatter.masses)
