@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcrctl.estimator.exact import State
 from tcrctl.estimator.settings import PassiveObserverSettings
@@ -34,6 +35,10 @@ TOLERANCE = 1e-4
 MAX_ITERATIONS = 30
 #: The same for the first frame, which may lie far from the model's rest.
 FIT_ITERATIONS = 80
+#: A marker that is lost is filled in for so long [s].
+FILL_S = 0.5
+#: Time constant of how far a marker is beside its node [s].
+BESIDE_S = 1.0
 
 
 class PassiveObserver:
@@ -53,6 +58,8 @@ class PassiveObserver:
         self._updates = 0
         self._fits, self._holds = settings.fit_start, settings.hold_blank
         self._last: Measurement | None = None
+        self._missing, self._known = np.zeros(rows.shape[0]), np.zeros(rows.shape[0], dtype=np.bool_)
+        self._beside = np.zeros((rows.shape[0], 3))
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._scratch.nodal[FORCE] = robot.weight
         self._valid, self._seen = np.zeros(rows.shape[0], dtype=np.bool_), self._coordinates[:0]
@@ -78,6 +85,26 @@ class PassiveObserver:
         elif self._holds and self._last is not None:
             return replace(measured, nodes=self._last.nodes, valid=self._last.valid)
         return measured
+
+    def _filled(self, measured: Measurement) -> Measurement:
+        """Put markers that were lost a moment ago where they must be: on their nodes, as far beside them as they were.
+
+        Markers sit beside their nodes. Without this, a ring that loses one for a frame would seem to jump.
+        """
+        self._missing = np.where(measured.valid, 0.0, self._missing + self._period)
+        fill = (self._missing > 0.0) & (self._missing < FILL_S) & self._known
+        if not fill.any():
+            return measured
+        at = (self._q + self._period * self._v)[self._coordinates].reshape(-1, 3) + self._beside
+        nodes = np.where(fill[:, None], at, measured.nodes)
+        return replace(measured, nodes=nodes, valid=measured.valid | fill)
+
+    def _remember(self, seen: NDArray[np.bool_], nodes: Array) -> None:
+        """Filter how far the seen markers are beside their nodes."""
+        beside = nodes - self._q[self._coordinates].reshape(-1, 3)
+        blend = np.where(self._known, 1.0 - np.exp(-self._period / BESIDE_S), 1.0)[:, None]
+        self._beside = np.where(seen[:, None], self._beside + blend * (beside - self._beside), self._beside)
+        self._known |= seen
 
     def _fit(self, measured: Measurement) -> bool:
         """Fit the resting model to a frame by statics, so that the robot does not seem to jump there in a step."""
@@ -121,12 +148,15 @@ class PassiveObserver:
         measured = self._held(measured)
         if self._fits:
             self._fits = not self._fit(measured)
+        seen = measured.valid
+        measured = self._filled(measured) if self._holds else measured
         load = self._load(measured)
         q = self._q.copy()
         model, drive = self._robot.model, measured.drive
         outcome = minimise(model, q, drive, load, self._work, TOLERANCE, MAX_ITERATIONS, False)
         if outcome.converged:
             self._v, self._q, self._drive = (q - self._q) / self._period, q, drive.copy()
+        self._remember(seen, measured.nodes)
         position, normal = self._correct(measured)
         return Estimate(
             t=measured.t,
