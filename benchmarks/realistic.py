@@ -2,9 +2,9 @@
 
     python benchmarks/realistic.py [--seeds 20] [--level moderate] [--processes 2] [--set KEY=VALUE] [NAME ...]
 
-Runs the shipped experiments as their files say, but for the plant. Prints for each the median over the seeds, the 95 %
-bootstrap interval of the median, the worst, the largest angle between the normals, and how many runs were stopped;
-those count as infinitely wrong.
+Runs the shipped experiments as their files say, but for the plant. Prints for each the median over the seeds, the
+95 % bootstrap interval of the median, the worst, the largest angle between the normals, and how many runs were
+stopped; those count as infinitely wrong.
 """
 
 from __future__ import annotations
@@ -76,11 +76,11 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE")
     given = parser.parse_args()
+    changes = " ".join(given.overrides) or "as shipped"
+    print(f"{given.level} plants, {given.seeds} seeds from {given.first} on, {changes}")
+    print()
     print(
-        f"{given.level} plants, {given.seeds} seeds from {given.first} on, {' '.join(given.overrides) or 'as shipped'}\n"
-    )
-    print(
-        "| experiment | largest position error, median [95 %] mm | worst mm | angle, median / worst deg | stopped |"
+        "| experiment | position error, median [95 %] mm | worst mm | angle, median / worst deg | stopped |"
     )
     print("|---|---|---|---|---|")
     with ProcessPoolExecutor(given.processes) as pool:
