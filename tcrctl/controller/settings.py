@@ -50,7 +50,7 @@ class TensionSettings(Settings):
 class IntegralSettings(Settings):
     """Integral action: the target is shifted by gain times the integrated error, with anti-windup."""
 
-    gain_1_s: float = quantity("1/s", "integral gain", 3.0, gt=0)
+    gain_1_s: float = quantity("1/s", "integral gain", 2.0, gt=0)
     limit_mm: float = quantity("mm", "largest shift of the target position", 20.0, gt=0)
     limit_deg: float = quantity("deg", "largest tilt of the target normal; output: pose only", 10.0, gt=0)
 
@@ -63,10 +63,10 @@ class DitherSettings(Settings):
     most_mm: float = quantity("mm", "largest amplitude", 2.0, gt=0, le=5)
     threshold_mm: float = quantity("mm", "innovation of the end position that is not friction", 0.3, gt=0)
     growth_1_s: float = quantity(
-        "1/s", "growth of the amplitude by innovation beyond the threshold", 1.0, gt=0
+        "1/s", "growth of the amplitude by innovation beyond the threshold", 8.0, gt=0
     )
     release_s: float = quantity("s", "time constant of its decay", 100.0, gt=0)
-    filter_s: float = quantity("s", "time constant of the innovation's size", 0.5, gt=0)
+    filter_s: float = quantity("s", "time constant of the innovation's size", 0.2, gt=0)
     outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
 
     @model_validator(mode="after")

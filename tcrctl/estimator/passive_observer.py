@@ -12,7 +12,8 @@ A mismatched model keeps the springs stretched. So the end pose is corrected by 
 the measured tip ring and the model's; while the tip ring is not seen, the last correction stays.
 
 A robot may hang beside its model from the start: the first frame is taken for a robot at rest (``fit_start``). A
-frame without any marker would let the model swing back there: it repeats the last one (``hold_blank``).
+frame without any marker would let the model swing back there: it repeats the last one (``hold_blank``), and a
+single lost marker is filled in for a while (``lost_markers``).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from dataclasses import replace
 import numpy as np
 
 from tcrctl.estimator.exact import State
+from tcrctl.estimator.lost_markers import LostMarkers
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.memory import NORMAL, POSITION, SPEED, Kept
 from tcrctl.robot import dynamics, pose
@@ -57,6 +59,7 @@ class PassiveObserver:
         self._updates = 0
         self._fits, self._holds = settings.fit_start, settings.hold_blank
         self._frame, self._frame_valid = np.zeros((rows.size, 3)), np.zeros(rows.size, dtype=np.bool_)
+        self._lost = LostMarkers(rows.size, period)
         self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
         self._scratch.nodal[FORCE] = robot.weight
         self._valid, self._seen = np.zeros(rows.shape[0], dtype=np.bool_), self._coordinates[:0]
@@ -83,6 +86,10 @@ class PassiveObserver:
         elif self._holds and self._frame_valid.any():
             return replace(measured, nodes=self._frame.astype(measured.nodes.dtype), valid=self._frame_valid)
         return measured
+
+    def _at_markers(self, q: Array) -> Array:
+        """Return the nodes that carry markers (n_markers, 3) [m]."""
+        return np.asarray(q[self._coordinates].reshape(-1, 3))
 
     def _fit(self, measured: Measurement) -> None:
         """Fit the resting model to a frame by statics: virtual springs and weight, no inertia, no damping.
@@ -127,12 +134,16 @@ class PassiveObserver:
         if self._fits and measured.valid.any():
             self._fit(measured)
             self._fits = False
+        seen = measured.valid
+        if self._holds:
+            measured = self._lost.filled(measured, self._at_markers(self._q + self._period * self._v))
         load = self._load(measured)
         q = self._q.copy()
         model, drive = self._robot.model, measured.drive
         outcome = minimise(model, q, drive, load, self._work, TOLERANCE, MAX_ITERATIONS, False)
         if outcome.converged:
             self._v, self._q, self._drive = (q - self._q) / self._period, q, drive.copy()
+        self._lost.remember(seen, measured.nodes, self._at_markers(self._q))
         position, normal = self._correct(measured)
         return Estimate(
             t=measured.t,
