@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from tcrctl.signals import Array, Measurement
 
+#: Markers of one ring. A ring that is lost whole is not filled in: nothing would hold it where it is.
+RING: Final = 3
 #: A lost marker is filled in for so long [s]; then it counts as not seen.
 LONGEST: Final = 0.5
 #: Time constant of the mean place of a marker beside its node [s].
@@ -37,7 +39,8 @@ class LostMarkers:
             expected: Where the nodes of all markers will be by the model (n_markers, 3) [m].
         """
         self._missing = np.where(measured.valid, 0.0, self._missing + self._period)
-        fill = (self._missing > 0.0) & (self._missing < LONGEST) & self._known
+        of_seen_ring = np.repeat(measured.valid.reshape(-1, RING).any(axis=1), RING)
+        fill = (self._missing > 0.0) & (self._missing < LONGEST) & self._known & of_seen_ring
         if not fill.any():
             return measured
         nodes = np.where(fill[:, None], expected + self._beside, measured.nodes)

@@ -56,3 +56,8 @@ def test_after_a_while_it_counts_as_not_seen(lost):
 def test_a_marker_that_was_never_seen_is_not_invented():
     fresh = LostMarkers(6, PERIOD)
     assert not fresh.filled(frame(ONE_LOST), NODES).valid[2]
+
+
+def test_a_ring_that_is_lost_whole_is_not_filled_in(lost):
+    valid = np.array([True, True, True, False, False, False])
+    assert not lost.filled(frame(valid), NODES).valid[3:].any()
