@@ -206,12 +206,12 @@ def test_a_reference_changed_by_one_ulp_is_found(logs, tmp_path):
 def test_a_weight_changed_by_1e_12_is_found_in_the_attachment_as_with_set(logs, tmp_path):
     path = logs("full")
     text = read_log(path).attachments[RESOLVED][1]
-    changed = text.replace(b"speed_change: 220.0", b"speed_change: 220.00000000022")
+    changed = text.replace(b"speed_change: 3500.0", b"speed_change: 3500.0000000035")
     assert changed != text
     in_file = replay(
         rewritten(path, tmp_path / "a.mcap", attachments={RESOLVED: ("application/yaml", changed)})
     )
-    by_hand = replay(path, overrides=["controller.weights.speed_change=220.00000000022"])
+    by_hand = replay(path, overrides=["controller.weights.speed_change=3500.0000000035"])
     assert in_file.first_difference == by_hand.first_difference
     assert in_file.first_difference.field.startswith("wanted.speed[")
     assert in_file.first_difference.step == 0
@@ -293,7 +293,7 @@ def test_a_longer_horizon_gets_its_references_from_the_trajectory(logs):
 
 
 def test_a_tolerance_forgives_small_differences_only(logs):
-    overrides = ["controller.weights.speed_change=220.00000000022"]
+    overrides = ["controller.weights.speed_change=3500.0000000035"]
     assert replay(logs("full"), overrides=overrides, tolerance=Tolerance(atol=1e-9)).status == "identical"
     assert replay(logs("full"), overrides=overrides, tolerance=Tolerance(rtol=1e-18)).status == "different"
     coarse = Tolerance(1e-9, 1e-9)
@@ -357,7 +357,7 @@ def test_the_command_prints_one_object_and_exits_0_or_3(logs, capsys):
     assert found["status"] == "identical"
     assert found["first_difference"] is None
     assert found["steps"] == found["compared"] > 0
-    change = ["--set", "controller.weights.speed_change=220.00000000022"]
+    change = ["--set", "controller.weights.speed_change=3500.0000000035"]
     assert main(["replay", path, "--json", *change]) == 3
     first = json.loads(capsys.readouterr().out)["first_difference"]
     assert set(first) == {"step", "field", "recorded", "replayed", "ulps"}

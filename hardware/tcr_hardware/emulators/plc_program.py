@@ -8,8 +8,7 @@
                |  RESET edge       |                           |
             fault latched <--------+ <-------------------------+   watchdog, e-stop, following error, drive
 
-The drives hold their position in every state: letting go of the cables would drop the robot. Nothing starts
-again by itself: after a stop a new ENABLE edge is needed, after a fault a RESET edge before it.
+The drives hold in every state: letting go drops the robot. A stop wants a new ENABLE edge, a fault a RESET first.
 """
 
 from __future__ import annotations
