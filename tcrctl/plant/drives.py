@@ -55,10 +55,13 @@ class SimulatedDrives:
         sampled = step / (1.0 - keep)
         self._step, self._ahead = step, sampled - lag
         self._servos = [
-            Servo(replace(servo, lag_s=sampled, speed_um_s=math.inf), UM * float(start[c]))
+            Servo(
+                replace(servo, lag_s=sampled, speed_um_s=math.inf),
+                in_counts(UM * float(start[c]), servo.count_um),
+            )
             for c, servo in enumerate(servo_settings(settings, start.size))
         ]
-        self.set_point = start.copy()
+        self.set_point = np.array([servo.position for servo in self._servos]) / UM
 
     def cable(self) -> Array:
         """Return the cable that is really taken in (m,) [m]."""

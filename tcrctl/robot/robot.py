@@ -119,7 +119,7 @@ def build_robot(description: RobotDescription) -> Robot:
 
 
 def hole_friction(friction: FrictionSettings, first_hole: NDArray[np.int64]) -> Array:
-    """Friction of every hole (n_holes, 3), columns as in ``elements.rubbing_cable``.
+    """Friction of every hole (n_holes, 3), read-only, columns as in ``elements.rubbing_cable``.
 
     Args:
         friction: Common to all holes, or with a coefficient per cable.
@@ -130,6 +130,7 @@ def hole_friction(friction: FrictionSettings, first_hole: NDArray[np.int64]) -> 
     holes[:, rubbing_cable.COEFFICIENT] = np.repeat(mu, np.diff(first_hole))
     holes[:, rubbing_cable.LEAST_WRAP] = np.radians(friction.least_wrap_deg)
     holes[:, rubbing_cable.DRAG] = friction.drag_n
+    holes.flags.writeable = False
     return holes
 
 

@@ -40,6 +40,15 @@ def test_a_realistic_run_is_replayed_bit_for_bit(run):
     assert found.compared > 10
 
 
+def test_a_run_on_drives_that_count_and_start_elsewhere_is_replayed_bit_for_bit(tmp_path):
+    drives = "plant.drives={quantisation_mm: 0.0137, lag_s: 0.05, zero_error_mm: 0.5}"
+    start = "plant.start_drives_mm=[1.003, -0.5, 0.25]"
+    spec = short_spec(drives, start, "plant.step_ms=2.5", "controller.speed_limit_mm_s=4")
+    found = replay(run_experiment(prepare(spec), out=tmp_path).log)
+    assert found.status == "identical", found.reason
+    assert not any("applied" in reason for reason in found.not_compared)
+
+
 def test_the_log_holds_what_was_drawn(run):
     experiment, path = run
     log = read_log(path)

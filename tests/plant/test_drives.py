@@ -102,6 +102,12 @@ def test_an_encoder_counts_and_a_set_point_is_rounded_to_counts():
     assert drives.set_point == pytest.approx([5.7e-5] * 2)
 
 
+@pytest.mark.parametrize("count", [0.0, 0.01, 0.0237])
+def test_at_the_start_the_drives_stand_where_they_shall_be_to_the_last_bit(count):
+    drives = build(start=(0.0123456, -0.00307), quantisation_mm=count)
+    assert np.array_equal(drives.reported(), drives.set_point)
+
+
 @pytest.mark.parametrize("reports", ["set_point", "encoder"])
 def test_what_is_reported_can_be_chosen(reports):
     drives = build(lag_s=0.1, reports=reports)
