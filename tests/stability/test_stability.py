@@ -268,3 +268,9 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(
     (tmp_path / "there.png").touch()
     assert main(["stability", "letter_t", *options]) == 2
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("effect", ["plant.friction.coefficient=0.1", "plant.drives.backlash_mm=0.2"])
+def test_a_plant_that_cannot_be_linearised_is_refused(effect, capsys):
+    assert main(["stability", "letter_t", "--set", effect, "--points", "1", "--quiet"]) == 2
+    assert "can be linearised" in capsys.readouterr().err

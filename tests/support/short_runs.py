@@ -40,7 +40,7 @@ def arguments(*overrides):
 
 def start(*options, cwd):
     """Start ``tcrctl run letter_t`` in a process of its own."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT / 'hardware'}"}
     return subprocess.Popen(
         [sys.executable, "-m", "tcrctl.cli.app", "run", "letter_t", *options],
         cwd=cwd,

@@ -221,7 +221,7 @@ def test_without_the_extra_the_error_says_how_to_get_it(log, tmp_path, monkeypat
 
 def test_the_command_prints_its_address_and_ends_with_ctrl_c(log):
     command = [sys.executable, "-m", "tcrctl.cli.app", "play", str(log), "--port", "0"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT / 'hardware'}"}
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
     ) as process:
