@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from typing import TypeAlias
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +106,16 @@ class Servo:
         self.position += self.speed * dt
         half = 0.5 * limits.backlash_um
         self.shaft = min(max(self.shaft, self.position - half), self.position + half)
+
+
+AnyServos: TypeAlias = ServoSettings | tuple[ServoSettings, ...]
+"""Drives that are all alike, or one by one."""
+
+
+def servos(settings: AnyServos, axes: int) -> list[Servo]:
+    """Return so many drives at 0."""
+    each = (settings,) * axes if isinstance(settings, ServoSettings) else settings
+    return [Servo(drive) for drive in each]
 
 
 def in_counts(position: float, count: float) -> float:

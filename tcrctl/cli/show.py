@@ -30,7 +30,8 @@ def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_jso
 
 def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
     from tcrctl.config import shipped
-    from tcrctl.experiment.spec import load_spec, with_draws
+    from tcrctl.experiment.draws import with_draws
+    from tcrctl.experiment.spec import load_spec
     from tcrctl.robot.description import load_robot
 
     if robot:

@@ -10,10 +10,8 @@ from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.strict_yaml import Document
 from tcrctl.errors import InputError
-from tcrctl.plant.own_robot import own_description
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
-from tcrctl.robot.robot import Robot
 
 #: Where it stands in an experiment.
 KEYS: Keys = ("plant", "robot")
@@ -80,27 +78,3 @@ def merged(base: Any, differences: Any) -> Any:
     if not isinstance(base, Mapping) or not isinstance(differences, Mapping):
         return differences
     return {**base, **{key: merged(base.get(key), value) for key, value in differences.items()}}
-
-
-def description_of_plant(
-    plant: SimulatedSettings,
-    robot: RobotDescription,
-    own: RobotDescription | None,
-    seed: int,
-    built: Robot | None = None,
-) -> RobotDescription | None:
-    """Return the robot of a plant with everything drawn; None if it is the controller's.
-
-    Args:
-        plant: Settings, as they run.
-        robot: The robot that the controller knows.
-        own: The plant's as designed, if it is another one.
-        seed: Of the run.
-        built: ``robot``, if it is built already.
-
-    Raises:
-        NoEquilibriumError: If it has no stable shape as designed.
-    """
-    if own is None and plant.scatter is None:
-        return None
-    return own_description(plant, own or robot, built if own is None else None, seed)

@@ -15,10 +15,10 @@ from tcrctl.errors import InputError, StoppedError
 from tcrctl.estimator.estimator import Estimator, build_estimator
 from tcrctl.estimator.exact import State
 from tcrctl.experiment.compilation import announced_compilation
+from tcrctl.experiment.draws import description_of_plant, with_draws
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.experiment.metrics import Metrics
-from tcrctl.experiment.plant_robot import description_of_plant
-from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, with_draws
+from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
 from tcrctl.loop.loop import run_loop, step_count
 from tcrctl.loop.pacing import Unpaced
 from tcrctl.loop.safety import SafetyLimits

@@ -18,7 +18,7 @@ import numpy as np
 
 from tcrctl import __version__
 from tcrctl.config import strict_yaml
-from tcrctl.experiment.plant_robot import description_of_plant
+from tcrctl.experiment.draws import description_of_plant
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
 from tcrctl.log.file_names import CAMERAS, PLANT_ROBOT, RESOLVED, RIG, ROBOT, SPEC, VERSIONS
 from tcrctl.plant.cameras import draw_cameras

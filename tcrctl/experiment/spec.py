@@ -9,7 +9,7 @@ import difflib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -23,7 +23,6 @@ from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveO
 from tcrctl.experiment.criterion import CriterionText
 from tcrctl.experiment.plant_robot import plant_robot
 from tcrctl.experiment.summary import TASK, UNITS
-from tcrctl.plant.realistic import as_drawn
 from tcrctl.plant.rig.file import LoadedRig, load_rig
 from tcrctl.plant.settings import PlantSettings, RigSettings, SimulatedSettings, list_misfits, rings_named
 from tcrctl.robot.description import RobotDescription, cable_routes
@@ -235,20 +234,6 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     rig = load_rig(spec.plant.rig, robot, path.parent) if isinstance(spec.plant, RigSettings) else None
     own = plant_robot(document, spec.plant, robot, robot_path)
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, own, notes)
-
-
-def with_draws(spec: ExperimentSpec, cables: int, seed: int | None = None) -> ExperimentSpec:
-    """Return an experiment as it runs: with a seed, and with what ``plant.realistic`` draws.
-
-    Args:
-        spec: The experiment.
-        cables: Number of cables of its robot.
-        seed: Seed of everything random; its own if None.
-    """
-    changes: dict[str, Any] = {} if seed is None else {"seed": seed}
-    if isinstance(spec.plant, SimulatedSettings):
-        changes["plant"] = as_drawn(spec.plant, cables, spec.seed if seed is None else seed)
-    return spec.model_copy(update=changes)
 
 
 def _overridden(

@@ -62,10 +62,14 @@ def test_markers_sit_beside_their_nodes_those_of_the_base_do_not(tcr5x4):
 @pytest.mark.parametrize("level", ["off", "moderate"])
 def test_the_robot_moves_as_that_of_a_simulated_plant_with_ideal_drives(tcr5x4, level):
     real = Imperfections("tcr5x4", tcr5x4, MISMATCH, level, 1)
-    ideal = real.plant.model_copy(update={"drives": None, "cameras": None, "realistic": "off", "step_ms": 2.0})
+    ideal = real.plant.model_copy(
+        update={"drives": None, "cameras": None, "realistic": "off", "step_ms": 2.0}
+    )
     plant = SimulatedPlant(ideal, real.robot, 0.01, 1)
     now, cable = [0.0], np.zeros(4)
-    robot = EmulatedRobot(real.robot, real.plant, lambda: cable.tolist(), lambda newtons: None, clock=lambda: now[0])
+    robot = EmulatedRobot(
+        real.robot, real.plant, lambda: cable.tolist(), lambda newtons: None, clock=lambda: now[0]
+    )
     for k in range(60):
         speed = 0.04 * np.cos(0.1 * k + np.arange(4))
         plant.write(Command(speed, np.zeros(4)))

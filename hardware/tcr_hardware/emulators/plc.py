@@ -23,7 +23,7 @@ from tcr_hardware.emulators.plc_image import PlcImage, Values, identity
 from tcr_hardware.emulators.plc_program import PlcLimitSettings, PlcProgram, command_of
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.modbus.registers import RegisterMap, Status, register_map
-from tcr_hardware.servo import ServoSettings
+from tcr_hardware.servo import AnyServos, ServoSettings
 
 #: Most time that is made up for at once [s]: a machine that stood still is no fault of the client.
 LONGEST_CATCH_UP_S = 0.05
@@ -54,7 +54,7 @@ class PlcSettings:
     zeroed: bool = True
     low_word_first: bool = False
     limits: PlcLimitSettings = field(default_factory=PlcLimitSettings)
-    servo: ServoSettings | tuple[ServoSettings, ...] = field(default_factory=ServoSettings)
+    servo: AnyServos = field(default_factory=ServoSettings)
     map: RegisterMap | None = None
 
 

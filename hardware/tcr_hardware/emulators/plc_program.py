@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tcr_hardware.modbus.registers import Control, Fault, Reject, Status
-from tcr_hardware.servo import Servo, ServoSettings
+from tcr_hardware.servo import AnyServos, servos
 
 #: Set-points are spread over the time between the last two sets, within these bounds [s].
 SHORTEST_INTERVAL_S, LONGEST_INTERVAL_S = 0.002, 0.1
@@ -86,18 +86,10 @@ class PlcProgram:
         active: Set-points that the drives follow (axes,) [um].
     """
 
-    def __init__(
-        self,
-        axes: int,
-        limits: PlcLimitSettings,
-        servo: ServoSettings | Sequence[ServoSettings],
-        *,
-        zeroed: bool,
-    ) -> None:
+    def __init__(self, axes: int, limits: PlcLimitSettings, servo: AnyServos, *, zeroed: bool) -> None:
         """Power up with all drives at rest at 0."""
         self._limits = limits
-        drives = [servo] * axes if isinstance(servo, ServoSettings) else servo
-        self.servos = [Servo(drive) for drive in drives]
+        self.servos = servos(servo, axes)
         self.estop = self.drive_lost = False
         self._origin = [0.0] * axes
         self.power_up()
