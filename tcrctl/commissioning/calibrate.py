@@ -63,8 +63,7 @@ def _measured(client: NatNetClient, nodes: list[NodeMarker], seconds: float) -> 
     positions, valid, frame = [], [], None
     end = time.monotonic() + seconds
     with device_errors("cameras"):
-        if client.models is not None:
-            found.resolve(client.models)
+        found.resolve(client.wait_models())
         while (left := end - time.monotonic()) > 0.0:
             frame = client.wait_next(frame, left)
             if frame is None:

@@ -147,10 +147,10 @@ class NatNetCameras:
         return new
 
     def _check_labels(self) -> None:
-        models = self.client.models
+        # A server that tells anew what it tracks has forgotten it for a moment: no reason to go without the check.
+        models = self.client.wait_models()
         try:
-            if models is not None:
-                self._map.resolve(models)
+            self._map.resolve(models)
         except MarkerMapError as error:
             raise InputError(f"the rig file names markers in vain: {error}", hint=error.hint) from error
 

@@ -102,7 +102,7 @@ def test_frames_arrive_every_way_and_mean_what_was_shown(way, version):
         assert client.server.application.startswith("Motive")
         newest = received[-1]
         by_id = {int(each["id"]): each["position"] for each in newest.data.markers}
-        labels = client.models.labels()
+        labels = client.wait_models().labels()
         assert sorted(labels) == sorted(NAMES)
         for row, name in enumerate(NAMES):
             assert by_id[labels[name]] == pytest.approx(POSITIONS[row])
