@@ -85,7 +85,9 @@ class Estimate:
         t: Time the state refers to [s].
         q: Node positions (3 n_nodes,) [m].
         v: Node velocities (3 n_nodes,) [m/s].
-        drive: Drive lengths (m,) [m].
+        drive: Drive lengths that the cables have now (m,) [m].
+        set_point: Drive lengths that were sent last (m,) [m].
+        arrived: Those sent a dead time of the drives ago (m,) [m].
         tension: Cable tensions of the model (m,) [N].
         position: End position (3,) [m].
         normal: End normal (3,).
@@ -97,6 +99,8 @@ class Estimate:
     q: Array
     v: Array
     drive: Array
+    set_point: Array
+    arrived: Array
     tension: Array
     position: Array
     normal: Array

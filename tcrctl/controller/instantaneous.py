@@ -54,7 +54,7 @@ class InstantaneousOptimalControl:
         """Take a ``controller:`` section and the robot."""
         self._settings, self._m = settings, robot.n_cables
         build = PREDICTORS[settings.model, settings.prediction.kind]
-        self._predictor = build(settings.prediction, settings.period_s, robot)
+        self._predictor = build(settings.prediction, settings.period_s, robot, settings.drives)
         self.ahead, self.blocks = self._predictor.grid.ahead, self._predictor.grid.blocks
         self._weights = make_weights(settings, robot.n_cables, self.ahead.size)
         self._needed = np.zeros(robot.n_cables)
@@ -73,7 +73,7 @@ class InstantaneousOptimalControl:
 
     def plan(self, at: Situation) -> Plan:
         """Find the first block of the optimal inputs."""
-        forecast = self._predictor.predict(at.estimate, at.age, at.outputs, at.previous)
+        forecast = self._predictor.predict(at.estimate, at.age, at.outputs, at.previous, at.shaken, at.place)
         solution, reason = NO_SOLUTION, at.doubt or _doubt(forecast)
         if not reason:
             target = make_target(self._settings, at.reference, at.shift, self._m)

@@ -21,6 +21,8 @@ import numpy as np
 from numba import njit
 
 from tcrctl.controller.blocks import Grid, make_grid, superpose
+from tcrctl.controller.drive_lag import DriveLag, with_lag
+from tcrctl.controller.settings import KnownDrives
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.prediction_settings import MultiStepSettings
@@ -30,14 +32,20 @@ from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, pose, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
+from tcrctl.robot.hole_drag import HoleDrag, drag_force, fill_hole_drag, no_drag
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.robot.response import POSE_ROWS
-from tcrctl.robot.robot import Robot
+from tcrctl.robot.robot import Robot, hole_friction
+from tcrctl.robot.sections import FrictionSettings
 from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, StaticMap, follow, rest_map
 from tcrctl.signals import Array, Estimate
 
+
+import os
+RET = os.environ.get('RET','1')=='1'
+TURN = float(os.environ.get('TURN', '0.04'))
 
 class Memory(NamedTuple):
     """What the predictor keeps from step to step, changed in place.
@@ -47,20 +55,27 @@ class Memory(NamedTuple):
         offset: Δ (3 n_nodes,) [m].
         v: Velocities of the last estimate (3 n_nodes,) [m/s].
         basis: Basis of the response (12 n_modules, modes + m).
+        drag: Drag of the dithered holes.
+        friction: Their friction (n_holes, 3), columns as in ``elements.rubbing_cable``.
     """
 
     at: StaticMap
     offset: Array
     v: Array
     basis: Array
+    drag: HoleDrag
+    friction: Array
 
 
 @njit(cache=True, error_model="numpy")
 def _update_offset(
-    model: Model, ws: Workspace, memory: Memory, deviation: Array, v: Array, period: float, blend: float
+    model: Model, ws: Workspace, memory: Memory, deviation: Array, now: Now, period: float, blend: float
 ) -> None:
     """Filter the displacement of the point that the robot vibrates about: δ + K^-1 M (a + α v)."""
-    force, lag = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
+    force, lag, v = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0]), now.v
+    drag_force(model, memory.drag, v, now.speed, force)
+    for k in range(force.shape[0]):
+        force[k] = -force[k]
     for k in range(force.shape[0]):
         i, row = k // SIZE, k % SIZE
         for b in range(SIZE):
@@ -97,13 +112,15 @@ def forecast(
     for k in range(q.shape[0]):
         deviation[k] = q[k] - at.equilibrium[k]
         finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
+    fill_hole_drag(model, at.equilibrium, ws.G, ws.tension, memory.friction, tuning.turn, memory.drag)
     if outcome.converged and tuning.blend > 0.0 and finite:
-        _update_offset(model, ws, memory, deviation, v, tuning.period, tuning.blend)
+        _update_offset(model, ws, memory, deviation, now, tuning.period, tuning.blend)
     for k in range(q.shape[0]):
         memory.v[k] = v[k]
         away[k] = deviation[k] - memory.offset[k]
     release = response.Release(away, v)
-    change, stable = response.respond(model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis)
+    change, stable = response.respond(model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis, memory.drag)
+    with_lag(change, grid.ahead[0], tuning.drives, now.behind, now.queue)
     free, gain = superpose(change, now.outputs, grid.edges)
     return outcome, stable, free, gain
 
@@ -111,17 +128,17 @@ def forecast(
 class MultiStep:
     """See the module's docstring."""
 
-    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot) -> None:
+    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, drives: KnownDrives) -> None:
         """Take a ``prediction:`` section, the control period [s] and the robot."""
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
-        self._tuning = make_tuning(period, settings.filter_s)
+        self._tuning = make_tuning(period, settings.filter_s)._replace(drives=DriveLag(drives.lag_s, drives.dead_time_s))
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
         at, still = rest_map(robot), np.zeros_like(robot.rest.q)
         q, drive = robot.rest.q.copy(), np.zeros(robot.n_cables)
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         basis = response.start_basis(robot.model, self._work, settings.modes)
-        self._memory = Memory(at, still, still.copy(), basis)
+        self._memory = Memory(at, still, still.copy(), basis, no_drag(robot.model), hole_friction(FrictionSettings(), robot.model.first_hole))
         self._solved = False
         self._fresh = settings.offset is not None and settings.offset.from_start
         self._gap = TensionGap(settings.tension_gap, period, robot.n_cables)
@@ -150,12 +167,11 @@ class MultiStep:
         what, at = "Newton on the statics; one LCP after it, not fed back", self._memory.at
         return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
-    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array) -> Forecast:
+    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array, shaken: float = 0.0, place: Array = 0.0) -> Forecast:
         """See :class:`Predictor`."""
-        del speed  # the prediction is linear: it does not depend on the last input
         robot, memory = self._robot, self._memory
-        now = Now(estimate.q + age * estimate.v, estimate.v, estimate.drive, outputs)
-        tuning = self._tuning
+        now = Now(estimate.q + age * estimate.v, estimate.v, estimate.drive, outputs, speed, estimate.arrived - (place if RET else 0.0) - estimate.drive, estimate.set_point - estimate.arrived)
+        tuning = self._tuning._replace(turn=TURN * shaken / (shaken**2 + 0.5e-3**2))
         if self._fresh:  # the robot rests: all of its deviation is offset
             memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0)
         outcome, stable, free, gain = forecast(

@@ -31,7 +31,7 @@ MAX_ITERATIONS = 60
 class OneStep:
     """See the module's docstring."""
 
-    def __init__(self, settings: OneStepSettings, period: float, robot: Robot) -> None:
+    def __init__(self, settings: OneStepSettings, period: float, robot: Robot, drives: object = None) -> None:
         """Take a ``prediction:`` section and the robot; the control ``period`` [s] does not matter."""
         del period
         self._robot, self._horizon = robot, settings.horizon_s
@@ -65,7 +65,7 @@ class OneStep:
         dynamics.lengths_before(self._robot.model, q, v, drive, np.zeros_like(drive), 0.0, s, self._work)
         return Load(inertia, 1.0 / step, s.nodal, s.bar_before, s.cable_before, None)
 
-    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array) -> Forecast:
+    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array, shaken: float = 0.0, place: object = None) -> Forecast:
         """See :class:`Predictor`."""
         del outputs  # the step predicts outputs from the state itself
         horizon, m, tip = self._horizon, speed.shape[0], self._robot.tip

@@ -38,6 +38,8 @@ class Situation:
     low: Array
     high: Array
     doubt: str
+    shaken: float = 0.0
+    place: Array | None = None
 
     def within(self, speed: Array) -> Array:
         """Return speeds of the coming period (m,) [m/s], each cut off at its limits."""

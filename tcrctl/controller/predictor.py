@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from tcrctl.controller.blocks import Grid
+from tcrctl.controller.drive_lag import DriveLag
 from tcrctl.controller.inner_map import Linearisable
 from tcrctl.controller.ioc import Prediction
 from tcrctl.robot.statics import SHARP, TOLERANCE
@@ -28,6 +29,9 @@ class Now(NamedTuple):
     v: Array
     drive: Array
     outputs: Array
+    speed: Array
+    behind: Array
+    queue: Array
 
 
 class Tuning(NamedTuple):
@@ -42,6 +46,8 @@ class Tuning(NamedTuple):
     period: float
     blend: float
     tolerance: float = TOLERANCE
+    turn: float = 0.0
+    drives: DriveLag = DriveLag(0.0, 0.0)
 
     def sharp(self) -> Tuning:
         """Return the same with solutions that are exact to rounding."""

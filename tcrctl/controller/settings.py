@@ -79,6 +79,16 @@ class DitherSettings(Settings):
             yield ("least_mm",), f"must be at most most_mm, {self.most_mm:g}, not {self.least_mm:g}"
 
 
+class KnownDrives(Settings):
+    """What the controller believes of the drives."""
+
+    lag_s: float = quantity("s", "time constant of their position loop", 0.0, ge=0, le=2)
+    dead_time_s: float = quantity("s", "time by which set-points arrive late", 0.0, ge=0, le=2)
+    reports: Literal["set_point", "encoder"] = Field(
+        default="encoder", description="what they report: where they shall be, or where they are"
+    )
+
+
 class ControllerSection(Settings):
     """What every ``controller:`` section can be asked, whatever its kind."""
 
@@ -130,6 +140,7 @@ class IocSettings(ControllerSection):
     dither: OrOff[DitherSettings] = Field(
         default=DitherSettings(), description="keeps cables from sticking in their holes, or off"
     )
+    drives: KnownDrives = Field(default=KnownDrives(), description="what is known of the drives")
     speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
 
     @model_validator(mode="after")

@@ -65,7 +65,7 @@ class Shell:
             integral=at.shift,
             reason=reason,
         )
-        return Command(speed, estimate.drive + self._settings.period_s * speed), info
+        return Command(speed, estimate.set_point + self._settings.period_s * speed), info
 
     def _situation(self, estimate: Estimate, reference: Reference) -> Situation:
         """Move the integral action on, and gather what the planner is told."""
@@ -76,7 +76,7 @@ class Shell:
         self._normal = now[3:6].copy() if self._settings.output == "pose" else None
         stands = planner.anti_windup and bool(self._saturated.any())
         shift = self._integral.update(error, stands)
-        low, high = input_limits(self._settings, self._robot, estimate.drive, planner.blocks)
+        low, high = input_limits(self._settings, self._robot, estimate.set_point, planner.blocks)
         return Situation(
             estimate=estimate,
             reference=reference,
@@ -88,6 +88,8 @@ class Shell:
             low=low,
             high=high,
             doubt=_doubt(estimate),
+            shaken=self.dither.amplitude,
+            place=self.dither.place,
         )
 
     def sharpen(self) -> None:

@@ -80,7 +80,7 @@ def forecast(
 class Static:
     """See the module's docstring."""
 
-    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot) -> None:
+    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, drives: object = None) -> None:
         """Take a ``prediction:`` section, the control period [s] and the robot."""
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
@@ -107,11 +107,11 @@ class Static:
         what, at = "Newton on the statics; one LCP after it, not fed back", self._memory.at
         return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
-    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array) -> Forecast:
+    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array, shaken: float = 0.0, place: object = None) -> Forecast:
         """See :class:`Predictor`."""
-        del age, speed  # at rest the past does not matter
+        del age, shaken  # at rest the past does not matter
         robot, memory = self._robot, self._memory
-        now = Now(estimate.q, estimate.v, estimate.drive, outputs)
+        now = Now(estimate.q, estimate.v, estimate.drive, outputs, speed, speed, speed)
         outcome, free, gain = forecast(
             robot.model, self._load, self._work, memory, now, self.grid, robot.tip, self._tuning
         )

@@ -45,7 +45,7 @@ def segment(q: Array, nodes: np.ndarray, weights: Array, h: int) -> tuple[float,
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(
+def spread(
     G: Array, c: int, nodes: np.ndarray, weights: Array, h: int, x: float, y: float, z: float
 ) -> None:
     """Add the derivative (x, y, z) with respect to hole ``h`` to row ``c`` of G (m, 3 n_nodes)."""
@@ -80,8 +80,8 @@ def path_gradients(
         for h in range(first_hole[c], first_hole[c + 1] - 1):
             stretch, ex, ey, ez = segment(q, nodes, weights, h)
             length[c] += stretch
-            _spread(G, c, nodes, weights, h, -ex, -ey, -ez)
-            _spread(G, c, nodes, weights, h + 1, ex, ey, ez)
+            spread(G, c, nodes, weights, h, -ex, -ey, -ez)
+            spread(G, c, nodes, weights, h + 1, ex, ey, ez)
 
 
 @njit(cache=True, error_model="numpy")

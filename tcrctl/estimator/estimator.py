@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol
 
 from tcrctl.config.settings import Settings
+from tcrctl.estimator.drives import DriveBelief
 from tcrctl.estimator.exact import State, build_exact
 from tcrctl.estimator.passive_observer import build_observer
 from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
@@ -31,7 +32,7 @@ KINDS: Final[Mapping[str, tuple[type[Settings], Builder]]] = {
 
 
 def build_estimator(
-    settings: EstimatorSettings, robot: Robot, period: float, state: State | None
+    settings: EstimatorSettings, robot: Robot, period: float, state: State | None, drives: DriveBelief | None = None
 ) -> Estimator:
     """Build the estimator of an ``estimator:`` section.
 
@@ -45,4 +46,4 @@ def build_estimator(
         InputError: If the exact state is asked for where there is none.
     """
     _, build = KINDS[settings.kind]
-    return build(settings, robot, period, state)
+    return build(settings, robot, period, state, drives or DriveBelief(0.0, 0.0, 'encoder', period))

@@ -9,6 +9,7 @@ import numpy as np
 from tcrctl.elements import sliding_cable
 from tcrctl.errors import InputError
 from tcrctl.estimator.settings import ExactSettings
+from tcrctl.estimator.drives import DriveBelief
 from tcrctl.memory import Kept
 from tcrctl.robot import pose
 from tcrctl.robot.robot import Robot
@@ -20,8 +21,8 @@ State = Callable[[], tuple[Array, Array]]
 class ExactState:
     """Passes on what ``state`` returns: true positions and velocities (3 n_nodes,) each."""
 
-    def __init__(self, robot: Robot, state: State) -> None:
-        self._robot, self._state = robot, state
+    def __init__(self, robot: Robot, state: State, drives: DriveBelief) -> None:
+        self._robot, self._state, self._drives = robot, state, drives
 
     def memory(self) -> Mapping[str, Kept]:
         """Nothing: the plant remembers."""
@@ -29,19 +30,22 @@ class ExactState:
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Estimate without error; tensions are those of the controller's model in that shape."""
-        del applied
+        self._drives.update(measured.drive, applied.drive)
+        drive = self._drives.reached
         q, v = self._state()
         model, tip = self._robot.model, self._robot.tip
         length, gradient = np.zeros(self._robot.n_cables), np.zeros((self._robot.n_cables, q.shape[0]))
         sliding_cable.path_gradients(
             q, model.first_hole, model.hole_nodes, model.hole_weights, model.cables, length, gradient
         )
-        stretch = length + measured.drive - model.cables[:, sliding_cable.REST]
+        stretch = length + drive - model.cables[:, sliding_cable.REST]
         return Estimate(
             t=measured.t,
             q=q,
             v=v,
-            drive=measured.drive.copy(),
+            drive=drive.copy(),
+            set_point=self._drives.set_point,
+            arrived=self._drives.arrived,
             tension=np.maximum(model.cables[:, sliding_cable.STIFFNESS] * stretch, 0.0),
             position=pose.position(q, tip),
             normal=pose.normal(q, tip),
@@ -50,7 +54,7 @@ class ExactState:
         )
 
 
-def build_exact(settings: ExactSettings, robot: Robot, period: float, state: State | None) -> ExactState:
+def build_exact(settings: ExactSettings, robot: Robot, period: float, state: State | None, drives: DriveBelief) -> ExactState:
     """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`.
 
     Raises:
@@ -59,4 +63,4 @@ def build_exact(settings: ExactSettings, robot: Robot, period: float, state: Sta
     del settings, period
     if state is None:
         raise InputError("estimator.kind: exact needs a simulated plant")
-    return ExactState(robot, state)
+    return ExactState(robot, state, drives)

@@ -23,6 +23,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tcrctl.estimator.drives import DriveBelief
 from tcrctl.estimator.exact import State
 from tcrctl.estimator.lost_markers import LostMarkers
 from tcrctl.estimator.settings import PassiveObserverSettings
@@ -44,9 +45,9 @@ FIT_ITERATIONS = 80
 class PassiveObserver:
     """See the module's docstring. State: positions, velocities, drives, correction of the end pose, last frame."""
 
-    def __init__(self, settings: PassiveObserverSettings, robot: Robot, period: float) -> None:
+    def __init__(self, settings: PassiveObserverSettings, robot: Robot, period: float, drives: DriveBelief) -> None:
         """Take an ``estimator:`` section, the robot and the control period [s]."""
-        self._robot, self._period = robot, period
+        self._robot, self._period, self._drives = robot, period, drives
         self._stiffness = settings.stiffness_n_m
         self._blend = -float(np.expm1(-period / settings.pose_filter_s))
         rows = np.array(ring_rows(robot.n_modules))
@@ -129,8 +130,8 @@ class PassiveObserver:
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Step the model to the time of ``measured``; the drives are those that it reports."""
-        del applied
-        measured = self._held(measured)
+        self._drives.update(measured.drive, applied.drive)
+        measured = replace(self._held(measured), drive=self._drives.reached)
         if self._fits and measured.valid.any():
             self._fit(measured)
             self._fits = False
@@ -150,6 +151,8 @@ class PassiveObserver:
             q=self._q,
             v=self._v,
             drive=self._drive,
+            set_point=self._drives.set_point,
+            arrived=self._drives.arrived,
             tension=self._work.tension.copy(),
             position=position,
             normal=normal,
@@ -159,8 +162,8 @@ class PassiveObserver:
 
 
 def build_observer(
-    settings: PassiveObserverSettings, robot: Robot, period: float, state: State | None
+    settings: PassiveObserverSettings, robot: Robot, period: float, state: State | None, drives: DriveBelief
 ) -> PassiveObserver:
     """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`."""
     del state
-    return PassiveObserver(settings, robot, period)
+    return PassiveObserver(settings, robot, period, drives)

@@ -13,6 +13,7 @@ from tcrctl.controller.controller import build_controller
 from tcrctl.controller.settings import speed_limit
 from tcrctl.errors import InputError, StoppedError
 from tcrctl.estimator.estimator import build_estimator
+from tcrctl.estimator.drives import DriveBelief
 from tcrctl.estimator.exact import State
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
@@ -136,6 +137,11 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
     return experiment
 
 
+def believed(settings, period):
+    known = getattr(settings, "drives", None)
+    return None if known is None else DriveBelief(known.lag_s, known.dead_time_s, known.reports, period)
+
+
 def make_trajectory(spec: ExperimentSpec, robot: Robot) -> Trajectory:
     """Build the trajectory of an experiment, to the targets of its task if it has one.
 
@@ -211,7 +217,7 @@ def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> tu
     parts = Parts(
         trajectory=trajectory,
         plant=plant,
-        estimator=build_estimator(spec.estimator, robot, period, state),
+        estimator=build_estimator(spec.estimator, robot, period, state, believed(spec.controller, period)),
         controller=build_controller(spec.controller, robot),
         period=period,
         steps=step_count(trajectory.duration, period),

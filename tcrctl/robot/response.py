@@ -26,6 +26,7 @@ from tcrctl.elements.sliding_cable import STIFFNESS
 from tcrctl.numerics import block_banded
 from tcrctl.robot import linear, pose
 from tcrctl.robot.equations import Workspace
+from tcrctl.robot.hole_drag import HoleDrag, project_drag
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
 from tcrctl.signals import Array
@@ -139,11 +140,13 @@ def _project(ws: Workspace, V: Array, GV: Array) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def _stage(U: Array, a: float, b: float, t: float, x: Array, v: Array, F: Array, X: Array) -> None:
-    """X = (a I + V'AV)^-1 (a x + b v + t F): reduced positions of one stage from its explicit parts x, v."""
+def _stage(
+    U: Array, a: float, b: float, t: float, x: Array, v: Array, F: Array, f: Array, X: Array
+) -> None:
+    """X = (a I + b D + V'AV)^-1 (a x + b v + t F + f): positions of one stage from its explicit parts x, v."""
     for i in range(X.shape[0]):
         for c in range(X.shape[1]):
-            X[i, c] = a * x[i, c] + b * v[i, c] + t * F[i, c]
+            X[i, c] = a * x[i, c] + b * v[i, c] + t * F[i, c] + f[i, c]
     block_banded.solve_transposed(U, X)
     block_banded.solve_upper(U, X)
 
@@ -169,6 +172,7 @@ def respond(
     tip: int,
     ws: Workspace,
     V: Array,
+    drag: HoleDrag,
 ) -> tuple[Array, bool]:
     """Predict changes of end pose and tensions after a state.
 
@@ -180,6 +184,7 @@ def respond(
         tip: Row of the first node of the tip ring.
         ws: Workspace of the static solve that found ``q_eq``.
         V: Basis (12 n_modules, modes + m), refined by this call; see :func:`start_basis`.
+        drag: Of the holes at ``q_eq``.
 
     Returns:
         change (steps, 7 + m, m + 1) of position [m], normal, twist [rad] and tensions [N] since the state:
@@ -195,8 +200,13 @@ def respond(
     GV, b = np.empty((m, r)), 1.0 / (GAMMA * step)
     reduced = _project(ws, V, GV)
     a = b * b + model.damping * b
+    D, pull, F0 = np.empty((r, r)), np.empty((r, m)), np.zeros((r, m + 1))
+    project_drag(model, drag, V, D, pull)
     for i in range(r):
         reduced[i, i] += a
+        for j in range(r):
+            reduced[i, j] += b * D[i, j]
+    F0[:, :m] = pull
     CV = np.dot(pose.output_matrix(q_eq, tip), V[first : first + 9])
     x, vx, F = np.zeros((r, m + 1)), np.zeros((r, m + 1)), np.zeros((r, m + 1))
     stage1, stage2 = np.empty((r, m + 1)), np.empty((r, m + 1))
@@ -210,13 +220,13 @@ def respond(
     _observe(CV, GV, ws.axial, 0.0, x, start)
     for n in range(steps):
         t = n * step
-        _stage(reduced, a, b, t + GAMMA * step, x, vx, F, stage1)
+        _stage(reduced, a, b, t + GAMMA * step, x, vx, F, F0 + b * np.dot(D, x), stage1)
         for i in range(r):
             for c in range(m + 1):
                 v1 = b * (stage1[i, c] - x[i, c])
                 x[i, c] += (1.0 - GAMMA) * step * v1
                 vx[i, c] += (1.0 - GAMMA) * step * b * (v1 - vx[i, c])
-        _stage(reduced, a, b, t + step, x, vx, F, stage2)
+        _stage(reduced, a, b, t + step, x, vx, F, F0 + b * np.dot(D, x), stage2)
         for i in range(r):
             for c in range(m + 1):
                 vx[i, c] = b * (stage2[i, c] - x[i, c])
