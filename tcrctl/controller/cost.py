@@ -1,4 +1,4 @@
-"""From settings to the arrays of the quadratic problem: weights, targets and input limits."""
+"""From settings to the arrays of the quadratic program: weights, targets and input limits."""
 
 from __future__ import annotations
 

@@ -112,8 +112,8 @@ class LiteralIoc:
         """(28) with (36): change of the free coordinates (12 n_modules,), and the new input with proof."""
         period = self._settings.period_s
         step, prediction = self._linearise(q, fixed.drive + period * speed, fixed.load, speed)
-        problem = build_ioc(prediction, fixed.target, fixed.previous, fixed.low, fixed.high, self._weights)
-        solution = solve_ioc(problem, prediction, self._weights)
+        program = build_ioc(prediction, fixed.target, fixed.previous, fixed.low, fixed.high, self._weights)
+        solution = solve_ioc(program, prediction, self._weights)
         return step + period * (self.gain @ (solution.inputs - speed)), solution
 
     def sharpen(self) -> None:
