@@ -1,4 +1,4 @@
-"""From loaded files to the problem, held against common mistakes in the data."""
+"""From loaded files to the regression, held against common mistakes in the data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tcrctl.identify.frame import Frame
 from tcrctl.identify.loading import LoadedIdentification
 from tcrctl.identify.log_data import Recording, read_recording
 from tcrctl.identify.parameters import start_of, with_values
-from tcrctl.identify.problem import Problem, distances
+from tcrctl.identify.regression import Regression, distances
 from tcrctl.robot.description import RobotDescription
 from tcrctl.robot.robot import build_robot
 from tcrctl.signals import Array
@@ -29,8 +29,8 @@ FORCES = ("_mpa", "_g", "_n")
 DAMPINGS = ("_n_s_m",)
 
 
-def build_problem(loaded: LoadedIdentification) -> tuple[Problem, str]:
-    """Build the problem; returns it and what stays when parameters change: ``tension`` or ``length``.
+def build_regression(loaded: LoadedIdentification) -> tuple[Regression, str]:
+    """Build the regression; returns it and what stays when parameters change: ``tension`` or ``length``.
 
     Raises:
         InputError: If the data do not fit the robot or each other, or are fewer than the unknowns.
@@ -49,10 +49,10 @@ def build_problem(loaded: LoadedIdentification) -> tuple[Problem, str]:
                     hint="Use strung_by: tension (--strung-by tension).",
                 )
     reference = spec.frame.reference if spec.frame.offset == "displacement" else ""
-    problem = Problem(
+    regression = Regression(
         robot, loaded.parameters, loaded.configurations, recordings, reference, spec.step_ms / 1e3
     )
-    return problem, strung_by
+    return regression, strung_by
 
 
 def _usual(loaded: LoadedIdentification, recordings: Sequence[Recording]) -> str:
@@ -86,7 +86,7 @@ def with_lengths(robot: RobotDescription, rest: Array) -> RobotDescription:
     return with_values(robot, changes)
 
 
-def choose_frame(loaded: LoadedIdentification, problem: Problem) -> tuple[Frame, Array, str]:
+def choose_frame(loaded: LoadedIdentification, regression: Regression) -> tuple[Frame, Array, str]:
     """Find the frame that fits the robot as given, and see that the data can be meant.
 
     Returns:
@@ -96,10 +96,10 @@ def choose_frame(loaded: LoadedIdentification, problem: Problem) -> tuple[Frame,
         NoEquilibriumError: If the robot as given has no stable shape.
         InputError: If the sizes are off by a unit, or the data are fewer than the unknowns.
     """
-    predicted, measured = problem.predict(start_of(problem.parameters)), problem.measured
+    predicted, measured = regression.predict(start_of(regression.parameters)), regression.measured
     frame, remark = Frame.of(loaded.spec.frame).aligned(predicted, measured), ""
-    _check_size(problem, predicted)
-    _check_amount(problem, frame)
+    _check_size(regression, predicted)
+    _check_amount(regression, frame)
     if loaded.spec.frame.mirrored == "try":
         other = replace(Frame.of(loaded.spec.frame), mirrored=True).aligned(predicted, measured)
         errors = [float(np.nanmean(distances(f, predicted, measured))) for f in (frame, other)]
@@ -110,24 +110,24 @@ def choose_frame(loaded: LoadedIdentification, problem: Problem) -> tuple[Frame,
     return frame, predicted, remark
 
 
-def _check_amount(problem: Problem, frame: Frame) -> None:
-    coordinates = int((~np.isnan(problem.measured)).sum())
-    unknowns = len(problem.parameters) + len(frame.unknowns)
+def _check_amount(regression: Regression, frame: Frame) -> None:
+    coordinates = int((~np.isnan(regression.measured)).sum())
+    unknowns = len(regression.parameters) + len(frame.unknowns)
     if coordinates < unknowns:
         raise InputError(
             f"{coordinates} measured coordinates are too few for {unknowns} unknowns "
-            f"({len(problem.parameters)} parameters, {len(frame.unknowns)} of the frame)",
+            f"({len(regression.parameters)} parameters, {len(frame.unknowns)} of the frame)",
             hint="Measure more configurations or points, or identify fewer parameters.",
         )
 
 
-def _check_size(problem: Problem, predicted: Array) -> None:
+def _check_size(regression: Regression, predicted: Array) -> None:
     """Compare how far measured and modelled points lie apart; a wrong unit shows whatever the frame."""
-    whole = ~np.isnan(problem.measured).any(axis=1)
+    whole = ~np.isnan(regression.measured).any(axis=1)
     if whole.sum() < 2:
         return
-    measured, modelled = problem.measured[whole], predicted[whole]
-    if problem.reference:
+    measured, modelled = regression.measured[whole], predicted[whole]
+    if regression.reference:
         sizes = [float(np.sqrt((points**2).sum(axis=1).mean())) for points in (measured, modelled)]
     else:
         sizes = [float(np.sqrt(points.var(axis=0).sum())) for points in (measured, modelled)]

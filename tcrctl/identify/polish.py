@@ -12,7 +12,7 @@ from tcrctl.errors import NoEquilibriumError
 from tcrctl.identify.best import Best
 from tcrctl.identify.evaluation import Evaluator
 from tcrctl.identify.frame import Frame
-from tcrctl.identify.problem import MM
+from tcrctl.identify.regression import MM
 from tcrctl.signals import Array
 
 #: Residual of every coordinate where the robot has no stable shape [mm]; the step is then refused.
@@ -47,7 +47,7 @@ class Residuals:
         predicted = self._prediction(x)
         if predicted is None:
             return np.full(int(self.used.sum()), NO_SHAPE)
-        difference = MM * (frame.place(predicted) - self.evaluator.problem.measured)[self.used]
+        difference = MM * (frame.place(predicted) - self.evaluator.regression.measured)[self.used]
         self.best.offer(float(difference @ difference), x, frame)
         out: Array = difference
         return out
@@ -72,7 +72,7 @@ class Residuals:
 
     def split(self, z: Array) -> tuple[Array, Frame]:
         """Parameters and frame of the unknowns."""
-        n = len(self.evaluator.problem.parameters)
+        n = len(self.evaluator.regression.parameters)
         return z[:n], self.frame.with_unknowns(z[n:])
 
     def _prediction(self, x: Array) -> Array | None:

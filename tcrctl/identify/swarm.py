@@ -9,7 +9,7 @@ import numpy as np
 from tcrctl.identify.best import Best
 from tcrctl.identify.evaluation import Evaluator
 from tcrctl.identify.frame import Frame
-from tcrctl.identify.problem import mean_distance
+from tcrctl.identify.regression import mean_distance
 from tcrctl.identify.settings import SwarmSettings
 from tcrctl.signals import Array
 
@@ -70,7 +70,7 @@ def _moved(place: Array, velocity: Array) -> tuple[Array, Array]:
 
 
 def _costs(evaluator: Evaluator, frame: Frame, particles: Array, best: Best) -> Array:
-    measured = evaluator.problem.measured
+    measured = evaluator.regression.measured
     costs = np.full(len(particles), NO_SHAPE)
     for i, predicted in enumerate(evaluator.predict_many(list(particles))):
         if predicted is not None:

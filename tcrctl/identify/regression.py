@@ -1,4 +1,4 @@
-"""The identification problem (10): measured points, the model's prediction of them, and their difference.
+"""The regression (10) of an identification: measured points, the model's prediction of them, and their difference.
 
 A *group* is one static configuration or one log; errors are told per group and groups are held out. A single
 log is divided into four groups of equal length instead.
@@ -31,8 +31,8 @@ _QUARTERS = 4
 
 
 @dataclass(frozen=True)
-class Problem:
-    """Everything that a prediction needs; plain data, so that it can go to another process.
+class Regression:
+    """Unknowns, data and what else a prediction needs; plain data, so that it can go to another process.
 
     Attributes:
         robot: The robot to start from.
@@ -145,7 +145,7 @@ class Problem:
     def _drives(self) -> Array:
         return np.array([c.drive for c in self.configurations]).reshape(-1, len(self.robot.cables.routes))
 
-    def with_parameters(self, parameters: Sequence[Parameter]) -> Problem:
+    def with_parameters(self, parameters: Sequence[Parameter]) -> Regression:
         """The same data with other parameters."""
         return replace(self, parameters=tuple(parameters))
 
