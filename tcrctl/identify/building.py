@@ -10,7 +10,7 @@ import numpy as np
 
 from tcrctl.elements import sliding_cable
 from tcrctl.errors import InputError
-from tcrctl.identify.frame import Frame
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.loading import LoadedIdentification
 from tcrctl.identify.log_data import Recording, read_recording
 from tcrctl.identify.parameters import start_of, with_values
@@ -86,31 +86,33 @@ def with_lengths(robot: RobotDescription, rest: Array) -> RobotDescription:
     return with_values(robot, changes)
 
 
-def choose_frame(loaded: LoadedIdentification, regression: Regression) -> tuple[Frame, Array, str]:
+def choose_frame(loaded: LoadedIdentification, regression: Regression) -> tuple[CoordinateFrame, Array, str]:
     """Find the frame that fits the robot as given, and see that the data can be meant.
 
     Returns:
-        Frame, prediction (n, 3) [m] of the robot as given, and a remark on the cables' order or nothing.
+        Coordinate frame, prediction (n, 3) [m] of the robot as given, and a remark on the cables' order or nothing.
 
     Raises:
         NoEquilibriumError: If the robot as given has no stable shape.
         InputError: If the sizes are off by a unit, or the data are fewer than the unknowns.
     """
     predicted, measured = regression.predict(start_of(regression.parameters)), regression.measured
-    frame, remark = Frame.of(loaded.spec.frame).aligned(predicted, measured), ""
+    known = CoordinateFrame.of(loaded.spec.frame)
+    frame = plain = known.aligned(predicted, measured)
+    remark = ""
     _check_size(regression, predicted)
     _check_amount(regression, frame)
     if loaded.spec.frame.mirrored == "try":
-        other = replace(Frame.of(loaded.spec.frame), mirrored=True).aligned(predicted, measured)
-        errors = [float(np.nanmean(distances(f, predicted, measured))) for f in (frame, other)]
-        frame = frame if errors[0] <= errors[1] else other
+        mirrored = replace(known, mirrored=True).aligned(predicted, measured)
+        errors = [float(np.nanmean(distances(f, predicted, measured))) for f in (plain, mirrored)]
+        frame = plain if errors[0] <= errors[1] else mirrored
         if abs(errors[0] - errors[1]) < 0.01 * max(errors):
             remark = "the data cannot tell whether the cables' order is mirrored; taken as not mirrored"
-            frame = frame if not frame.mirrored else Frame.of(loaded.spec.frame).aligned(predicted, measured)
+            frame = plain
     return frame, predicted, remark
 
 
-def _check_amount(regression: Regression, frame: Frame) -> None:
+def _check_amount(regression: Regression, frame: CoordinateFrame) -> None:
     coordinates = int((~np.isnan(regression.measured)).sum())
     unknowns = len(regression.parameters) + len(frame.unknowns)
     if coordinates < unknowns:

@@ -14,8 +14,8 @@ from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.identify.best import Best
 from tcrctl.identify.building import assumed_forces, build_regression, choose_frame
 from tcrctl.identify.certainty import Certainty, certainty
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.evaluation import Evaluator, available_cores
-from tcrctl.identify.frame import Frame
 from tcrctl.identify.held_out import held_out_errors
 from tcrctl.identify.loading import LoadedIdentification
 from tcrctl.identify.parameters import start_of, values, with_values
@@ -51,7 +51,7 @@ class Work:
         loaded: What is to be done.
         regression: Data and model.
         start: Prediction of the robot as given (n, 3) [m].
-        frame: Frame that fits it.
+        frame: Coordinate frame that fits it.
         evaluator: Evaluates the model.
         best: Best answer so far.
         stages: Methods done.
@@ -61,7 +61,7 @@ class Work:
     loaded: LoadedIdentification
     regression: Regression
     start: Array
-    frame: Frame
+    frame: CoordinateFrame
     evaluator: Evaluator
     best: Best
     stages: list[Stage] = field(default_factory=list)
@@ -72,7 +72,7 @@ class Work:
         """Which coordinates are measured (n, 3)."""
         return ~np.isnan(self.regression.measured)
 
-    def errors(self, frame: Frame, predicted: Array) -> Array:
+    def errors(self, frame: CoordinateFrame, predicted: Array) -> Array:
         """Distances of all measured points [mm]."""
         return distances(frame, predicted, self.regression.measured)[self.used.any(axis=1)]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tcrctl.errors import NoEquilibriumError
 from tcrctl.identify.best import Best
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.evaluation import Evaluator
-from tcrctl.identify.frame import Frame
 from tcrctl.identify.regression import MM
 from tcrctl.signals import Array
 
@@ -35,7 +35,7 @@ class Residuals:
     """
 
     evaluator: Evaluator
-    frame: Frame
+    frame: CoordinateFrame
     used: NDArray[np.bool_]
     best: Best
     _predicted: tuple[Array, Array | None] | None = None
@@ -70,7 +70,7 @@ class Residuals:
         self._jacobian = z.copy(), found
         return found
 
-    def split(self, z: Array) -> tuple[Array, Frame]:
+    def split(self, z: Array) -> tuple[Array, CoordinateFrame]:
         """Parameters and frame of the unknowns."""
         n = len(self.evaluator.regression.parameters)
         return z[:n], self.frame.with_unknowns(z[n:])

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.identify.frame import Frame
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.log_data import Recording
 from tcrctl.identify.motion import marker_motion
 from tcrctl.identify.parameters import Parameter, values, with_values
@@ -154,14 +154,14 @@ class Regression:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def distances(frame: Frame, predicted: Array, measured: Array) -> Array:
+def distances(frame: CoordinateFrame, predicted: Array, measured: Array) -> Array:
     """Distance between prediction and measurement (n,) [mm] over the measured coordinates of each point."""
     difference = MM * (frame.place(predicted) - measured)
     out: Array = np.sqrt(np.nansum(difference**2, axis=1))
     return out
 
 
-def mean_distance(frame: Frame, predicted: Array, measured: Array) -> float:
+def mean_distance(frame: CoordinateFrame, predicted: Array, measured: Array) -> float:
     """The objective (10) [mm], frame unknowns at their best."""
     seen = ~np.isnan(measured).all(axis=1)
     found = frame.aligned(predicted, measured)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tcrctl.identify.certainty import Certainty
-from tcrctl.identify.frame import Frame
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.parameters import Parameter
 from tcrctl.robot.description import RobotDescription
 from tcrctl.signals import Array
@@ -86,7 +86,7 @@ class Result:
     strung_by: str
     parameters: tuple[Parameter, ...]
     values: Array
-    frame: Frame
+    frame: CoordinateFrame
     certainty: Certainty | None
     groups: tuple[Group, ...]
     mean_error_before_mm: float

@@ -25,7 +25,7 @@ from tcrctl.signals import Array
 
 WORLD: Final = "world"
 REFERENCE: Final = "reference"
-"""Frame of the wanted end on ``/tf``."""
+"""Coordinate frame of the wanted end on ``/tf``."""
 
 Colour = tuple[float, float, float]
 

@@ -23,7 +23,7 @@ Seen = Callable[[NDArray[np.bool_], float], NDArray[np.bool_]]
 """Which markers can be seen at a time, out of those that carry one."""
 
 
-class Frame(NamedTuple):
+class CameraFrame(NamedTuple):
     """What the cameras report.
 
     Attributes:
@@ -106,7 +106,10 @@ class ImperfectCameras:
         self._settings, self._latency, self._noise = settings, latency, noise
         self.draw = draw_cameras(settings, markers, seed)
         self._shapes: deque[tuple[float, Array]] = deque()
-        self._markers, self._last = markers, Frame(0.0, np.zeros((markers, 3)), np.zeros(markers, np.bool_))
+        self._markers, self._last = (
+            markers,
+            CameraFrame(0.0, np.zeros((markers, 3)), np.zeros(markers, np.bool_)),
+        )
         self._coming, self._arrival, self._newest = 0, latency + self._late(), 0.0
 
     def watch(self, t: float, nodes: Array) -> None:
@@ -117,7 +120,7 @@ class ImperfectCameras:
         """From now on report what is seen without noise."""
         self._noise = 0.0
 
-    def read(self, now: float, carries: NDArray[np.bool_], seen: Seen) -> Frame:
+    def read(self, now: float, carries: NDArray[np.bool_], seen: Seen) -> CameraFrame:
         """Report the newest frame.
 
         Args:
@@ -131,7 +134,7 @@ class ImperfectCameras:
             nodes = self._reported(self._shape(exposed))
             valid = seen(carries, exposed)
             valid &= self._random.random(self._markers) >= self._settings.lost_markers
-            self._last = Frame(exposed, nodes, valid)
+            self._last = CameraFrame(exposed, nodes, valid)
         return self._last
 
     def _happens(self, share: float) -> bool:

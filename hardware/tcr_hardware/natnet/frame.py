@@ -104,7 +104,7 @@ class Suffix(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class MocapFrame:
     """One decoded frame. The arrays are read-only views of the packet.
 
     Attributes:

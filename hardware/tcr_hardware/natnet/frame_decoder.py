@@ -32,8 +32,8 @@ from tcr_hardware.natnet.frame import (
     Analog,
     Asset,
     BodyMarkers,
-    Frame,
     MarkerSet,
+    MocapFrame,
     Records,
     Skeleton,
     Suffix,
@@ -91,7 +91,7 @@ def layout_of(version: Version) -> Layout:
     )
 
 
-def decode_frame(payload: bytes, version: Version) -> Frame:
+def decode_frame(payload: bytes, version: Version) -> MocapFrame:
     """Decode the payload of FRAMEOFDATA.
 
     Raises:
@@ -111,7 +111,7 @@ def decode_frame(payload: bytes, version: Version) -> Frame:
         _, size = reader.integer(), reader.integer()  # a section that we do not know
         reader.skip(size)
     suffix = _suffix(reader, layout)
-    return Frame(
+    return MocapFrame(
         number, marker_sets, unlabelled, rigid_bodies, body_markers, skeletons, assets, markers, plates,
         devices, suffix,
     )  # fmt: skip

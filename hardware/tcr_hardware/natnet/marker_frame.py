@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from tcr_hardware.natnet.frame import Frame
+from tcr_hardware.natnet.frame import MocapFrame
 from tcr_hardware.natnet.models import ModelDefinitions
 
 
@@ -28,7 +28,7 @@ class MarkerFrame:
     arrival: float
     exposure: float | None
     software_latency: float | None
-    data: Frame
+    data: MocapFrame
     models: ModelDefinitions | None
 
     @property

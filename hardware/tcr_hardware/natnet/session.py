@@ -15,7 +15,7 @@ from collections.abc import Callable
 from tcr_hardware.natnet import protocol
 from tcr_hardware.natnet.clock import ServerClock
 from tcr_hardware.natnet.errors import MalformedPacketError, NatNetError
-from tcr_hardware.natnet.frame import BITSTREAM_CHANGED, MODELS_CHANGED, Frame
+from tcr_hardware.natnet.frame import BITSTREAM_CHANGED, MODELS_CHANGED, MocapFrame
 from tcr_hardware.natnet.frame_decoder import decode_frame
 from tcr_hardware.natnet.marker_frame import MarkerFrame
 from tcr_hardware.natnet.model_decoder import decode_models
@@ -186,7 +186,7 @@ class Session:
             self.models = None
             self._timers.now_due("models")
 
-    def _on_our_clock(self, data: Frame, now: float) -> MarkerFrame:
+    def _on_our_clock(self, data: MocapFrame, now: float) -> MarkerFrame:
         latency, suffix = data.suffix.software_latency, data.suffix
         if latency is None and suffix.received and suffix.transmit and self.clock.hz:
             latency = (suffix.transmit - suffix.received) / self.clock.hz

@@ -16,7 +16,7 @@ from tcrctl.signals import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class CoordinateFrame:
     """Where the frame lies, and what of it is unknown.
 
     Attributes:
@@ -34,7 +34,7 @@ class Frame:
     free_offset: bool
 
     @classmethod
-    def of(cls, settings: FrameSettings) -> Frame:
+    def of(cls, settings: FrameSettings) -> CoordinateFrame:
         """The frame as far as it is known; ``mirrored: try`` begins with no."""
         return cls(
             yaw=math.radians(settings.yaw_deg),
@@ -49,7 +49,7 @@ class Frame:
         """Values of what is unknown: yaw, then offset; (0,), (1,), (3,) or (4,)."""
         return np.concatenate([[self.yaw] * self.free_yaw, self.offset if self.free_offset else []])
 
-    def with_unknowns(self, values: Array) -> Frame:
+    def with_unknowns(self, values: Array) -> CoordinateFrame:
         """The frame with other values of what is unknown."""
         yaw = float(values[0]) if self.free_yaw else self.yaw
         return replace(self, yaw=yaw, offset=values[-3:] if self.free_offset else self.offset)
@@ -77,7 +77,7 @@ class Frame:
             columns += [np.tile(axis, (len(model), 1)) for axis in np.eye(3)]
         return np.stack(columns, axis=2) if columns else np.zeros((*model.shape, 0))
 
-    def aligned(self, model: Array, measured: Array) -> Frame:
+    def aligned(self, model: Array, measured: Array) -> CoordinateFrame:
         """The frame with the unknowns that fit best, points not measured (NaN) left out.
 
         Args:
