@@ -15,8 +15,8 @@ from tcrctl.loop.loop import step_count
 from tcrctl.loop.pacing import RealTime
 from tcrctl.plant.rig.bench import connect_drives, envelope, supervisor_rules
 from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
-from tcrctl.plant.rig.session import Session
 from tcrctl.signals import Array, Command
 
 #: Period of the writes [s].
@@ -50,7 +50,7 @@ def jog_rig(
     loaded: LoadedRig,
     names: tuple[str, ...],
     jog: Jog,
-    session: Session,
+    operation: Operation,
     *,
     dry_run: bool,
     check: Callable[[], None],
@@ -61,7 +61,7 @@ def jog_rig(
         loaded: The rig file.
         names: Cables of the robot in the order of the drives.
         jog: The motion.
-        session: Takes events, knows whether the operator has agreed.
+        operation: Takes events, knows whether the operator has agreed.
         dry_run: Read where the drives are and return what would be done; nothing is written.
         check: Raises if a signal asks to stop.
 
@@ -76,7 +76,7 @@ def jog_rig(
         envelope(loaded.mounted, rules, names), supervisor_rules(rules), 1.0, 0, 0, rules.arm_timeout_s
     )
     pace = RealTime(PERIOD, check)
-    plant = RigPlant(WithoutCameras(), drives, limits, PERIOD, session)
+    plant = RigPlant(WithoutCameras(), drives, limits, PERIOD, operation)
     try:
         drives.check(rules, PERIOD)
         plant.look()

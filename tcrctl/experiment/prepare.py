@@ -24,7 +24,7 @@ from tcrctl.loop.safety import SafetyGuard, SafetyLimits
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.realistic import rehearsal_plant
 from tcrctl.plant.rig.bench import build_rig
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
@@ -41,7 +41,7 @@ START_READS: Final = 10
 WARM_UP_STEPS: Final = 3
 
 Notify = Callable[[str], None]
-PlantBuilder = Callable[[Any, "Experiment", Session], tuple[RunnablePlant, State | None]]
+PlantBuilder = Callable[[Any, "Experiment", Operation], tuple[RunnablePlant, State | None]]
 
 
 def silent(text: str) -> None:
@@ -86,9 +86,9 @@ class Experiment:
 
 
 def _simulated(
-    settings: SimulatedSettings, experiment: Experiment, session: Session
+    settings: SimulatedSettings, experiment: Experiment, operation: Operation
 ) -> tuple[RunnablePlant, State]:
-    del session
+    del operation
     loaded, spec, robot = experiment.loaded, experiment.spec, experiment.robot
     own = description_of_plant(settings, loaded.robot, loaded.plant_robot, spec.seed, robot)
     robot = robot if own is None else build_robot(own)
@@ -96,11 +96,11 @@ def _simulated(
     return plant, plant.state
 
 
-def _rig(settings: RigSettings, experiment: Experiment, session: Session) -> tuple[RunnablePlant, None]:
+def _rig(settings: RigSettings, experiment: Experiment, operation: Operation) -> tuple[RunnablePlant, None]:
     del settings  # the file that it names is loaded
     if experiment.loaded.rig is None:
         raise InputError("the experiment was loaded without a rig file")
-    return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, session), None
+    return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, operation), None
 
 
 #: Section and builder of every ``plant.kind``; it returns the plant, and its true state if it knows it.
@@ -170,12 +170,14 @@ def make_task(experiment: Experiment) -> Task | None:
     return build_task(spec.task, spec.seed, 1e-3 * modules.rod_diameter_mm) if spec.task else None
 
 
-def build_plant(experiment: Experiment, session: Session | None = None) -> tuple[RunnablePlant, State | None]:
+def build_plant(
+    experiment: Experiment, operation: Operation | None = None
+) -> tuple[RunnablePlant, State | None]:
     """Build the plant; returns its true state too if it knows it.
 
     Args:
         experiment: What it is for.
-        session: What the plant may know of the run.
+        operation: What the plant may know of the run.
 
     Raises:
         DeviceError: If it cannot be reached.
@@ -183,7 +185,7 @@ def build_plant(experiment: Experiment, session: Session | None = None) -> tuple
     """
     settings = experiment.spec.plant
     _, build = PLANTS[settings.kind]
-    return build(settings, experiment, session or Session())
+    return build(settings, experiment, operation or Operation())
 
 
 def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> tuple[Parts, float]:

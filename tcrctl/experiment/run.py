@@ -38,7 +38,7 @@ from tcrctl.loop.pacing import Pace, RealTime, Unpaced
 from tcrctl.loop.quiet import quiet_interpreter
 from tcrctl.plant.plant import RunnablePlant
 from tcrctl.plant.rig.journal import Journal
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.robot.module import RIGID_BARS, module_of, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import StepRecord
@@ -89,7 +89,7 @@ def run_experiment(
     with Interruption() as interruption:
         pace = RealTime(experiment.period, interruption.check) if realtime else Unpaced(interruption.check)
         journal = Journal(pace.time, notify)
-        plant, state = build_plant(experiment, Session(pace.time, journal.report, confirmed))
+        plant, state = build_plant(experiment, Operation(pace.time, journal.report, confirmed))
         try:
             parts, start_offset = build_parts(experiment, plant, state)
             folder = make_run_folder(out, experiment.spec.name)

@@ -89,19 +89,19 @@ def replay(
     environment = changes(log)
     announce(environment)
     origin = rebuild(log, overrides)
-    session = _Session(log, origin, window, tolerance, watch)
+    work = _Replay(log, origin, window, tolerance, watch)
     begin = time.perf_counter()
     with ExitStack() as stack:
-        writer = None if out is None else stack.enter_context(open_replayed(out, log, origin, session.robot))
-        ended = session.run(None if writer is None else writer.step, progress)
-        result = session.result(ended, environment, time.perf_counter() - begin, out)
+        writer = None if out is None else stack.enter_context(open_replayed(out, log, origin, work.robot))
+        ended = work.run(None if writer is None else writer.step, progress)
+        result = work.result(ended, environment, time.perf_counter() - begin, out)
         if writer is not None:
             found = {"status": "success", "reason": "", "replay": json.dumps(result.as_json())}
             writer.finish(found)
     return result
 
 
-class _Session:
+class _Replay:
     """One replay in progress."""
 
     def __init__(

@@ -22,8 +22,8 @@ from tcrctl.errors import TcrctlError
 from tcrctl.loop.pacing import RealTime
 from tcrctl.plant.rig.bench import build_rig
 from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigPlant
-from tcrctl.plant.rig.session import Session
 from tcrctl.plant.rig.settings import RigFile
 from tcrctl.robot.module import ring_rows
 from tcrctl.signals import Command
@@ -225,8 +225,8 @@ class Bench:
         return LoadedRig(rig, "tcr5x4", None, b"")
 
     def plant(self) -> RigPlant:
-        session = Session(time.monotonic, lambda *event: self.events.append(event), confirmed=True)
-        return build_rig(self.loaded(), self.robot, PERIOD, session)
+        operation = Operation(time.monotonic, lambda *event: self.events.append(event), confirmed=True)
+        return build_rig(self.loaded(), self.robot, PERIOD, operation)
 
     def fail(self, case: Case):
         if isinstance(case.cameras, tuple):

@@ -9,8 +9,8 @@ import numpy as np
 from support.loop_fakes import Clock
 from tcrctl.errors import DeviceError
 from tcrctl.plant.rig.devices import DriveControl, DriveStatus, Sighting
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
-from tcrctl.plant.rig.session import Session
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
 from tcrctl.plant.rig.sight import Rules
 from tcrctl.signals import RawFrame
@@ -108,10 +108,10 @@ class Bench:
         self.clock = Clock()
         self.cameras, self.drives = FakeCameras(self.clock), FakeDrives(self.clock)
         self.events = []
-        session = Session(self.clock, lambda *event: self.events.append(event), confirmed)
+        operation = Operation(self.clock, lambda *event: self.events.append(event), confirmed)
         limits = RigLimits(limits or envelope(), rules, seen_share, N, N, arm_timeout=1.0)
         self.plant = RigPlant(
-            self.cameras, self.drives, limits, PERIOD, session, clock=self.clock, sleep=self.clock.sleep
+            self.cameras, self.drives, limits, PERIOD, operation, clock=self.clock, sleep=self.clock.sleep
         )
 
     @property

@@ -21,5 +21,5 @@ def reset(
     act(
         rig, robot, dry_run, yes, as_json,
         lambda loaded: f"The latched fault of the drives of {loaded.robot} is cleared.",
-        lambda loaded, names, session: reset_rig(loaded, names, session, dry_run=dry_run),
+        lambda loaded, names, operation: reset_rig(loaded, names, operation, dry_run=dry_run),
     )  # fmt: skip

@@ -23,5 +23,5 @@ def zero(
     act(
         rig, robot, dry_run, yes, as_json,
         lambda loaded: f"The present positions of the drives of {loaded.robot} become zero.",
-        lambda loaded, names, session: zero_rig(loaded, names, session, dry_run=dry_run),
+        lambda loaded, names, operation: zero_rig(loaded, names, operation, dry_run=dry_run),
     )  # fmt: skip

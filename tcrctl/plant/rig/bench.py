@@ -8,8 +8,8 @@ import numpy as np
 
 from tcrctl.errors import InputError
 from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
-from tcrctl.plant.rig.session import Session
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
 from tcrctl.plant.rig.settings import MountedRobot, SafetyRules
 from tcrctl.plant.rig.sight import Rules
@@ -86,14 +86,14 @@ def connect_drives(loaded: LoadedRig, names: tuple[str, ...]) -> ModbusDrives:
     return ModbusDrives(loaded.mounted, names)
 
 
-def build_rig(loaded: LoadedRig, robot: Robot, period: float, session: Session) -> RigPlant:
+def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operation) -> RigPlant:
     """Connect to a rig; nothing moves before it is started.
 
     Args:
         loaded: The rig file.
         robot: The robot that hangs there.
         period: Control period [s].
-        session: The run.
+        operation: The run.
 
     Raises:
         DeviceError: If cameras or drives do not answer.
@@ -120,7 +120,7 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, session: Session) 
         nodes=len(ring_rows(robot.n_modules)),
         arm_timeout=rules.arm_timeout_s,
     )
-    return RigPlant(cameras, drives, limits, period, session)
+    return RigPlant(cameras, drives, limits, period, operation)
 
 
 def _check_period(rules: SafetyRules, period: float) -> None:

@@ -22,7 +22,7 @@ from tcrctl.errors import ArmingRefusedError, DeviceError
 from tcrctl.plant.rig.devices import Cameras, DriveControl, Drives, Sighting
 from tcrctl.plant.rig.doubt_notes import DoubtNotes
 from tcrctl.plant.rig.drive_line import DriveLine
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.set_points import ClampNotes, DriveEnvelope, Micrometres, SetPoints
 from tcrctl.plant.rig.sight import Rules, Sight
 from tcrctl.plant.rig.supervisor import State, Supervisor
@@ -68,7 +68,7 @@ class RigPlant:
         drives: Drives,
         limits: RigLimits,
         period: float,
-        session: Session,
+        operation: Operation,
         *,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
@@ -80,18 +80,18 @@ class RigPlant:
             drives: The cable drives.
             limits: What must be kept.
             period: Control period [s].
-            session: The run.
+            operation: The run.
             clock: Never jumps; that of the camera frames [s].
             sleep: Waits for a time [s].
         """
         self._cameras, self._line, self._limits = cameras, DriveLine(drives, clock), limits
-        self._period, self._session, self._clock, self._sleep = period, session, clock, sleep
-        self.supervisor = Supervisor(limits.rules, session.report)
+        self._period, self._operation, self._clock, self._sleep = period, operation, clock, sleep
+        self.supervisor = Supervisor(limits.rules, operation.report)
         self._points: SetPoints | None = None
         self._refused = 0
         self._seen: Sighting | None = None
         self._usable_at = -np.inf
-        self._clamps, self._doubts = ClampNotes(session.report), DoubtNotes(session.report, clock)
+        self._clamps, self._doubts = ClampNotes(operation.report), DoubtNotes(operation.report, clock)
 
     # --- the loop ---
 
@@ -151,7 +151,7 @@ class RigPlant:
             ArmingRefusedError: If a condition is not met; nothing has moved.
             DeviceError: If the drives are lost.
         """
-        self.supervisor.check_ready(self.look(), confirmed=self._session.confirmed)
+        self.supervisor.check_ready(self.look(), confirmed=self._operation.confirmed)
         self.arm(f"operator agreed; measurement {1e3 * self._sight().age:.0f} ms old")
 
     def arm(self, cause: str) -> None:
@@ -253,7 +253,7 @@ class RigPlant:
         return self._cameras.next(PATIENCE * interval, fresh=interval <= 0.5 * self._period)
 
     def _measurement(self, sighting: Sighting | None) -> Measurement:
-        now, run_time = self._clock(), self._session.time()
+        now, run_time = self._clock(), self._operation.time()
         status = self._line.status
         drive = np.zeros(0) if status is None else np.asarray(1e-6 * status.position, float)
         if sighting is None:

@@ -15,7 +15,7 @@ from tcr_hardware.modbus.registers import Status
 from tcrctl.commissioning.zero import reset_rig
 from tcrctl.errors import ArmingRefusedError, InputError, RigStopError
 from tcrctl.plant.rig.bench import build_rig
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.operation import Operation
 
 #: What a busy computer may add to any time [s].
 LATE = 1.0
@@ -84,7 +84,7 @@ def test_after_a_fault_nothing_is_armed_until_an_operator_has_reset_it(tcr5x4):
         bench.plc.press_estop()
         time.sleep(0.02)
         names = tcr5x4.cable_names
-        agreed, not_agreed = Session(confirmed=True), Session(confirmed=False)
+        agreed, not_agreed = Operation(confirmed=True), Operation(confirmed=False)
         with pytest.raises(ArmingRefusedError, match="emergency stop is pressed"):
             reset_rig(bench.loaded(), names, agreed, dry_run=False)
         bench.plc.release_estop()
@@ -110,7 +110,7 @@ def test_a_rig_file_that_allows_more_than_the_plc_is_refused(tcr5x4):
         assert "cable c3: -20 to 30 mm on axis 3, PLC -25 to 25 mm" in str(caught.value)
         assert "max_step_mm 7 mm, PLC 6 mm" in str(caught.value)
     with Bench(tcr5x4, PATIENT, watchdog_ms=200) as bench, pytest.raises(InputError, match="watchdog"):
-        build_rig(bench.loaded(), tcr5x4, 0.15, Session())
+        build_rig(bench.loaded(), tcr5x4, 0.15, Operation())
 
 
 def test_a_label_that_the_cameras_do_not_know_is_refused(tcr5x4):
