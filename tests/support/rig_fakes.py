@@ -12,7 +12,7 @@ from tcrctl.plant.rig.devices import DriveControl, DriveStatus, Sighting
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
-from tcrctl.plant.rig.sight import Rules
+from tcrctl.plant.rig.health import Rules
 from tcrctl.signals import RawFrame
 
 M, N = 3, 6

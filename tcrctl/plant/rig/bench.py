@@ -8,11 +8,11 @@ import numpy as np
 
 from tcrctl.errors import InputError
 from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.health import Rules
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
 from tcrctl.plant.rig.settings import MountedRobot, SafetyRules
-from tcrctl.plant.rig.sight import Rules
 from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot
 

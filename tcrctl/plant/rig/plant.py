@@ -22,9 +22,9 @@ from tcrctl.errors import ArmingRefusedError, DeviceError
 from tcrctl.plant.rig.devices import Cameras, DriveControl, Drives, Sighting
 from tcrctl.plant.rig.doubt_notes import DoubtNotes
 from tcrctl.plant.rig.drive_line import DriveLine
+from tcrctl.plant.rig.health import Health, Rules
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.set_points import ClampNotes, DriveEnvelope, Micrometres, SetPoints
-from tcrctl.plant.rig.sight import Rules, Sight
 from tcrctl.plant.rig.supervisor import State, Supervisor
 from tcrctl.signals import Array, Command, Measurement, Truth
 
@@ -152,7 +152,7 @@ class RigPlant:
             DeviceError: If the drives are lost.
         """
         self.supervisor.check_ready(self.look(), confirmed=self._operation.confirmed)
-        self.arm(f"operator agreed; measurement {1e3 * self._sight().age:.0f} ms old")
+        self.arm(f"operator agreed; measurement {1e3 * self._health().age:.0f} ms old")
 
     def arm(self, cause: str) -> None:
         """Switch the drives on and wait until they are; see :meth:`start`, which also looks at the cameras."""
@@ -164,11 +164,11 @@ class RigPlant:
                     hint = "Bring it inside with the PLC's own manual mode."
                     raise ArmingRefusedError(outside, hint=hint)
                 self._line.exchange(position, on)
-                sight = self._sight()
-                if sight.silence > self._limits.rules.silence:
-                    raise DeviceError(f"the drives do not answer: {sight.trouble}")
-                status = sight.status
-                if status is not None and status.enabled and status.acknowledged and not sight.trouble:
+                health = self._health()
+                if health.silence > self._limits.rules.silence:
+                    raise DeviceError(f"the drives do not answer: {health.trouble}")
+                status = health.status
+                if status is not None and status.enabled and status.acknowledged and not health.trouble:
                     break
                 if self._clock() - begun > self._limits.arm_timeout:
                     why = (status.fault if status else "") or "they do not say why"
@@ -207,7 +207,7 @@ class RigPlant:
         """
         return self._line.position()
 
-    def look(self) -> Sight:
+    def look(self) -> Health:
         """Ask cameras and drives and return what is known, without any consequence.
 
         A frame that has waited here for too long is no sign of bad cameras, so others get their chance.
@@ -216,8 +216,8 @@ class RigPlant:
         end = self._clock() + FIRST_LOOK * self._limits.rules.stale_stop
         while True:
             self._measurement(self._frame())
-            if self._sight().age < self._limits.rules.stale or self._clock() >= end:
-                return self._sight()
+            if self._health().age < self._limits.rules.stale or self._clock() >= end:
+                return self._health()
 
     def _come_to_rest(self) -> None:
         """Let the PLC ramp down, and see the drives stand still from one cycle to the next.
@@ -231,8 +231,8 @@ class RigPlant:
             answered, now = self._line.ask(), self.position()
             moved = before is None or bool(np.any(np.abs(now - before) > STILL))
             before = now
-            sight = replace(self._sight(), silence=0.0) if answered else self._sight()
-            if self.supervisor.rest(self._clock(), sight, moved=moved) is State.STOPPING:
+            health = replace(self._health(), silence=0.0) if answered else self._health()
+            if self.supervisor.rest(self._clock(), health, moved=moved) is State.STOPPING:
                 self._sleep(CYCLE)
 
     # --- devices ---
@@ -275,13 +275,13 @@ class RigPlant:
 
     # --- supervision ---
 
-    def _sight(self) -> Sight:
+    def _health(self) -> Health:
         now, following, laggard = self._clock(), 0, ""
         if self._points is not None and self._line.status is not None:
             error = np.abs(self._line.status.position - self._points.accepted)
             worst = int(np.argmax(error))
             following, laggard = int(error[worst]), self._limits.envelope.names[worst]
-        return Sight(
+        return Health(
             age=now - self._usable_at,
             status=self._line.status,
             silence=self._line.silence(),
@@ -293,6 +293,6 @@ class RigPlant:
         )
 
     def _supervise(self) -> None:
-        self.supervisor.watch(self._clock(), self._sight())
+        self.supervisor.watch(self._clock(), self._health())
         if self.supervisor.failure is not None:
             raise self.supervisor.failure

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from support.rig_fakes import RULES
 from tcrctl.errors import ArmingRefusedError, DeviceError, RigStopError
 from tcrctl.plant.rig.devices import DriveControl, DriveStatus
-from tcrctl.plant.rig.sight import Sight
+from tcrctl.plant.rig.health import Health
 from tcrctl.plant.rig.supervisor import State, Supervisor
 
 WELL = DriveStatus(np.zeros(3, np.int64), enabled=True, zeroed=True)
-GOOD = Sight(age=0.004, status=WELL)
+GOOD = Health(age=0.004, status=WELL)
 MOVING = (State.ARMED, State.RUNNING, State.HOLDING)
 
 
@@ -70,10 +70,10 @@ REFUSED = {
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_arming_is_refused_with_every_reason(name):
-    sight, confirmed, word = REFUSED[name]
+    health, confirmed, word = REFUSED[name]
     supervisor, events = made()
     with pytest.raises(ArmingRefusedError) as caught:
-        supervisor.check_ready(sight, confirmed=confirmed)
+        supervisor.check_ready(health, confirmed=confirmed)
     assert word in str(caught.value)
     assert (caught.value.exit_code, len(caught.value.reasons)) == (4, 1)
     assert (supervisor.state, events) == (State.DISARMED, [])
@@ -107,9 +107,9 @@ FAULTS = {
 @pytest.mark.parametrize("state", MOVING)
 @pytest.mark.parametrize("name", FAULTS)
 def test_every_fault_ends_every_moving_state_with_its_cause(name, state):
-    sight, end, kind, word = FAULTS[name]
+    health, end, kind, word = FAULTS[name]
     supervisor, events = made(state)
-    assert supervisor.watch(1.0, sight) is end
+    assert supervisor.watch(1.0, health) is end
     assert type(supervisor.failure) is kind
     assert word in str(supervisor.failure)
     ((where, level, text),) = events
@@ -149,13 +149,13 @@ def test_a_controlled_stop_ends_disarmed_at_standstill():
 
 
 @pytest.mark.parametrize(
-    ("sight", "word"),
+    ("health", "word"),
     [(status(stopping=True), "still moving"), (replace(GOOD, trouble="timeout", silence=0.5), "timeout")],
 )
-def test_a_stop_that_does_not_end_is_a_fault(sight, word):
+def test_a_stop_that_does_not_end_is_a_fault(health, word):
     supervisor, _ = made(State.STOPPING)
-    assert supervisor.rest(RULES.standstill, sight, moved=True) is State.STOPPING
-    assert supervisor.rest(RULES.standstill + 0.01, sight, moved=True) is State.FAULTED
+    assert supervisor.rest(RULES.standstill, health, moved=True) is State.STOPPING
+    assert supervisor.rest(RULES.standstill + 0.01, health, moved=True) is State.FAULTED
     assert word in str(supervisor.failure)
 
 
@@ -164,7 +164,7 @@ def test_an_emergency_stop_during_a_controlled_stop_is_latched():
     assert supervisor.rest(0.1, status(estop=True), moved=False) is State.FAULTED
 
 
-SIGHTS = st.builds(
+STATES_OF_HEALTH = st.builds(
     replace,
     st.just(GOOD),
     age=st.sampled_from([0.001, 0.06, 0.3]),
@@ -177,13 +177,13 @@ SIGHTS = st.builds(
 
 
 @pytest.mark.slow
-@given(st.sampled_from([State.STOPPING, State.FAULTED]), st.lists(SIGHTS, max_size=20))
-def test_nothing_that_is_seen_lets_a_stopped_robot_move_again(state, sights):
+@given(st.sampled_from([State.STOPPING, State.FAULTED]), st.lists(STATES_OF_HEALTH, max_size=20))
+def test_nothing_that_is_seen_lets_a_stopped_robot_move_again(state, healths):
     supervisor, _ = made(state)
-    for k, sight in enumerate(sights):
-        supervisor.watch(0.01 * k, sight)
+    for k, health in enumerate(healths):
+        supervisor.watch(0.01 * k, health)
         supervisor.run()
-        supervisor.rest(0.01 * k, sight, moved=False)
+        supervisor.rest(0.01 * k, health, moved=False)
         assert supervisor.state in (State.STOPPING, State.FAULTED, State.DISARMED)
         assert supervisor.control in (DriveControl(), DriveControl(enable=True))
     supervisor.stop(1.0, "again")
