@@ -10,7 +10,7 @@ import numpy as np
 
 from tcrctl.commissioning.finding import Finding
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.plant.rig.bench import connect_cameras, connect_drives
+from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
 from tcrctl.plant.rig.devices import DriveStatus, Sighting
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.modbus_drives import ModbusDrives

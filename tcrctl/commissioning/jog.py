@@ -13,7 +13,7 @@ from tcrctl.commissioning.without_cameras import WithoutCameras
 from tcrctl.errors import InputError
 from tcrctl.loop.loop import step_count
 from tcrctl.loop.pacing import RealTime
-from tcrctl.plant.rig.bench import connect_drives, envelope, supervisor_rules
+from tcrctl.plant.rig.assembly import connect_drives, envelope, supervisor_rules
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant

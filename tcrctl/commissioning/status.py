@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.plant.rig.bench import connect_drives
+from tcrctl.plant.rig.assembly import connect_drives
 from tcrctl.plant.rig.devices import DriveStatus
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.natnet_cameras import connect

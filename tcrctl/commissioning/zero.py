@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from tcrctl.errors import ArmingRefusedError, DeviceError
-from tcrctl.plant.rig.bench import connect_drives, supervisor_rules
+from tcrctl.plant.rig.assembly import connect_drives, supervisor_rules
 from tcrctl.plant.rig.devices import DriveControl, Drives, DriveStatus
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.operation import Operation

@@ -23,7 +23,7 @@ from tcrctl.loop.loop import Parts, run_loop, step_count
 from tcrctl.loop.safety import SafetyGuard, SafetyLimits
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.realistic import rehearsal_plant
-from tcrctl.plant.rig.bench import build_rig
+from tcrctl.plant.rig.assembly import build_rig
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant

@@ -20,7 +20,7 @@ from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.modbus.registers import Control
 from tcrctl.errors import TcrctlError
 from tcrctl.loop.pacing import RealTime
-from tcrctl.plant.rig.bench import build_rig
+from tcrctl.plant.rig.assembly import build_rig
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigPlant
@@ -171,7 +171,7 @@ class Outcome:
 
 
 @dataclass
-class Bench:
+class WatchedEmulators:
     """Both emulators, and everything that reaches the PLC."""
 
     robot: Any
@@ -261,20 +261,20 @@ class Loop:
 
 def play(case: Case, phase: str, robot: Any, rules: dict[str, Any], watchdog_ms: int = 200) -> Outcome:
     """Let a fault happen in a phase."""
-    with Bench(robot, rules, watchdog_ms) as bench:
+    with WatchedEmulators(robot, rules, watchdog_ms) as emulators:
         if phase == "connect":
-            bench.fail(case)
+            emulators.fail(case)
         plant, error, begun = None, None, time.monotonic()
         decided = begun
         try:
-            plant = bench.plant()
+            plant = emulators.plant()
             plant.start()
             loop = Loop(plant)
             if phase in ("moving", "stopping"):
                 loop.run(BEFORE)
             begun = decided = time.monotonic()
             if phase != "connect":
-                bench.fail(case)
+                emulators.fail(case)
             if phase != "stopping":
                 harmless_case = case.phases()[phase] == "running"
                 loop.run(WATCHED if harmless_case else AFTER_END)
@@ -283,10 +283,10 @@ def play(case: Case, phase: str, robot: Any, rules: dict[str, Any], watchdog_ms:
         state = "disarmed" if plant is None else str(plant.supervisor.state)
         if plant is not None:
             error, state = _closed(plant, error, "" if phase == "stopping" else state)
-        moved = _moves(bench.plc)
+        moved = _moves(emulators.plc)
         return Outcome(
-            state, error, decided - begun, [text for kind, _, text in bench.events if kind == "supervisor"],
-            np.array(bench.sent).reshape(-1, 6), moved,
+            state, error, decided - begun, [text for kind, _, text in emulators.events if kind == "supervisor"],
+            np.array(emulators.sent).reshape(-1, 6), moved,
         )  # fmt: skip
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from support.loop_fakes import Clock
 from tcrctl.errors import DeviceError
 from tcrctl.plant.rig.devices import DriveControl, DriveStatus, Sighting
+from tcrctl.plant.rig.health import Rules
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
-from tcrctl.plant.rig.health import Rules
 from tcrctl.signals import RawFrame
 
 M, N = 3, 6
@@ -101,7 +101,7 @@ class FakeDrives:
         self.status_now = replace(self.status_now, **changes)
 
 
-class Bench:
+class FakeRig:
     """A rig plant on fakes, its events, and a loop that paces itself on the fake clock."""
 
     def __init__(self, *, confirmed=True, limits=None, rules=RULES, seen_share=0.3):
