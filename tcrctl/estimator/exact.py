@@ -14,13 +14,14 @@ from tcrctl.robot import pose
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, Estimate, Measurement
 
-State = Callable[[], tuple[Array, Array]]
+TrueState = Callable[[], tuple[Array, Array]]
+"""Returns positions and velocities (3 n_nodes,) each [m], [m/s]."""
 
 
 class ExactState:
     """Passes on what ``state`` returns: true positions and velocities (3 n_nodes,) each."""
 
-    def __init__(self, robot: Robot, state: State) -> None:
+    def __init__(self, robot: Robot, state: TrueState) -> None:
         self._robot, self._state = robot, state
 
     def memory(self) -> Mapping[str, Kept]:
@@ -50,7 +51,7 @@ class ExactState:
         )
 
 
-def build_exact(settings: ExactSettings, robot: Robot, period: float, state: State | None) -> ExactState:
+def build_exact(settings: ExactSettings, robot: Robot, period: float, state: TrueState | None) -> ExactState:
     """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`.
 
     Raises:

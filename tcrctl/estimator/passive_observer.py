@@ -23,7 +23,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tcrctl.estimator.exact import State
+from tcrctl.estimator.exact import TrueState
 from tcrctl.estimator.lost_markers import LostMarkers
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.memory import NORMAL, POSITION, SPEED, Kept
@@ -159,7 +159,7 @@ class PassiveObserver:
 
 
 def build_observer(
-    settings: PassiveObserverSettings, robot: Robot, period: float, state: State | None
+    settings: PassiveObserverSettings, robot: Robot, period: float, state: TrueState | None
 ) -> PassiveObserver:
     """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`."""
     del state

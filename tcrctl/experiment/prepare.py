@@ -13,7 +13,7 @@ from tcrctl.controller.controller import build_controller
 from tcrctl.controller.settings import speed_limit
 from tcrctl.errors import InputError, StoppedError
 from tcrctl.estimator.estimator import build_estimator
-from tcrctl.estimator.exact import State
+from tcrctl.estimator.exact import TrueState
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.experiment.metrics import Metrics
@@ -41,7 +41,7 @@ START_READS: Final = 10
 WARM_UP_STEPS: Final = 3
 
 Notify = Callable[[str], None]
-PlantBuilder = Callable[[Any, "Experiment", Operation], tuple[RunnablePlant, State | None]]
+PlantBuilder = Callable[[Any, "Experiment", Operation], tuple[RunnablePlant, TrueState | None]]
 
 
 def silent(text: str) -> None:
@@ -87,7 +87,7 @@ class Experiment:
 
 def _simulated(
     settings: SimulatedSettings, experiment: Experiment, operation: Operation
-) -> tuple[RunnablePlant, State]:
+) -> tuple[RunnablePlant, TrueState]:
     del operation
     loaded, spec, robot = experiment.loaded, experiment.spec, experiment.robot
     own = description_of_plant(settings, loaded.robot, loaded.plant_robot, spec.seed, robot)
@@ -172,7 +172,7 @@ def make_task(experiment: Experiment) -> Task | None:
 
 def build_plant(
     experiment: Experiment, operation: Operation | None = None
-) -> tuple[RunnablePlant, State | None]:
+) -> tuple[RunnablePlant, TrueState | None]:
     """Build the plant; returns its true state too if it knows it.
 
     Args:
@@ -188,7 +188,7 @@ def build_plant(
     return build(settings, experiment, operation or Operation())
 
 
-def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> tuple[Parts, float]:
+def build_parts(experiment: Experiment, plant: Plant, state: TrueState | None) -> tuple[Parts, float]:
     """Build estimator and controller for a plant at rest, and let the trajectory begin where the plant is.
 
     Args:

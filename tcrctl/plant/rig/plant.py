@@ -25,7 +25,7 @@ from tcrctl.plant.rig.drive_line import DriveLine
 from tcrctl.plant.rig.health import Health, Rules
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.set_points import ClampNotes, DriveEnvelope, Micrometres, SetPoints
-from tcrctl.plant.rig.supervisor import State, Supervisor
+from tcrctl.plant.rig.supervisor import SafetyState, Supervisor
 from tcrctl.signals import Array, Command, Measurement, Truth
 
 #: How often the drives are written to while they are armed or stopped outside the control loop [s].
@@ -124,7 +124,7 @@ class RigPlant:
             raise ArmingRefusedError(["the rig was never started"])
         self.supervisor.run()
         before = points.accepted
-        if self.supervisor.state is State.RUNNING:
+        if self.supervisor.state is SafetyState.RUNNING:
             target, clamps = points.propose(command.speed)
         else:
             points.start_again()
@@ -226,13 +226,13 @@ class RigPlant:
         """
         self.supervisor.stop(self._clock(), "end of the run")
         before: Micrometres | None = None
-        while self.supervisor.state is State.STOPPING:
+        while self.supervisor.state is SafetyState.STOPPING:
             self._line.exchange(self.position(), self.supervisor.control)
             answered, now = self._line.ask(), self.position()
             moved = before is None or bool(np.any(np.abs(now - before) > STILL))
             before = now
             health = replace(self._health(), silence=0.0) if answered else self._health()
-            if self.supervisor.rest(self._clock(), health, moved=moved) is State.STOPPING:
+            if self.supervisor.rest(self._clock(), health, moved=moved) is SafetyState.STOPPING:
                 self._sleep(CYCLE)
 
     # --- devices ---

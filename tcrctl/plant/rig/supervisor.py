@@ -44,7 +44,7 @@ Report = Callable[[str, str, str], None]
 RESET_HINT: Final = "When the cause is removed: tcrctl rig reset"
 
 
-class State(StrEnum):
+class SafetyState(StrEnum):
     """States of the supervisor, see the module's docstring."""
 
     DISARMED = "disarmed"
@@ -57,24 +57,24 @@ class State(StrEnum):
 
 
 _NEXT: Final = {
-    State.DISARMED: {State.ZEROING, State.ARMED, State.FAULTED},
-    State.ZEROING: {State.DISARMED, State.FAULTED},
-    State.ARMED: {State.RUNNING, State.STOPPING, State.FAULTED},
-    State.RUNNING: {State.HOLDING, State.STOPPING, State.FAULTED},
-    State.HOLDING: {State.RUNNING, State.STOPPING, State.FAULTED},
-    State.STOPPING: {State.DISARMED, State.FAULTED},
-    State.FAULTED: {State.DISARMED},
+    SafetyState.DISARMED: {SafetyState.ZEROING, SafetyState.ARMED, SafetyState.FAULTED},
+    SafetyState.ZEROING: {SafetyState.DISARMED, SafetyState.FAULTED},
+    SafetyState.ARMED: {SafetyState.RUNNING, SafetyState.STOPPING, SafetyState.FAULTED},
+    SafetyState.RUNNING: {SafetyState.HOLDING, SafetyState.STOPPING, SafetyState.FAULTED},
+    SafetyState.HOLDING: {SafetyState.RUNNING, SafetyState.STOPPING, SafetyState.FAULTED},
+    SafetyState.STOPPING: {SafetyState.DISARMED, SafetyState.FAULTED},
+    SafetyState.FAULTED: {SafetyState.DISARMED},
 }
 _CONTROL: Final = {
-    State.DISARMED: DriveControl(),
-    State.ZEROING: DriveControl(permit=True),
-    State.ARMED: DriveControl(enable=True, permit=True),
-    State.RUNNING: DriveControl(enable=True, follow=True, permit=True),
-    State.HOLDING: DriveControl(enable=True, follow=True, permit=True),
-    State.STOPPING: DriveControl(enable=True),
-    State.FAULTED: DriveControl(),
+    SafetyState.DISARMED: DriveControl(),
+    SafetyState.ZEROING: DriveControl(permit=True),
+    SafetyState.ARMED: DriveControl(enable=True, permit=True),
+    SafetyState.RUNNING: DriveControl(enable=True, follow=True, permit=True),
+    SafetyState.HOLDING: DriveControl(enable=True, follow=True, permit=True),
+    SafetyState.STOPPING: DriveControl(enable=True),
+    SafetyState.FAULTED: DriveControl(),
 }
-_MOVING: Final = (State.ARMED, State.RUNNING, State.HOLDING)
+_MOVING: Final = (SafetyState.ARMED, SafetyState.RUNNING, SafetyState.HOLDING)
 
 
 class Supervisor:
@@ -87,7 +87,7 @@ class Supervisor:
 
     def __init__(self, rules: Rules, report: Report) -> None:
         """Begin disarmed; ``report`` takes every transition with its cause."""
-        self.state, self.failure = State.DISARMED, None
+        self.state, self.failure = SafetyState.DISARMED, None
         self._rules, self._report = rules, report
         self._stopping_since = 0.0
 
@@ -101,7 +101,7 @@ class Supervisor:
     @property
     def armed(self) -> bool:
         """Whether the drives are on because of this program."""
-        return self.state in (*_MOVING, State.ZEROING, State.STOPPING)
+        return self.state in (*_MOVING, SafetyState.ZEROING, SafetyState.STOPPING)
 
     def check_ready(self, health: Health, *, confirmed: bool) -> None:
         """Find out whether the drives may be armed.
@@ -116,7 +116,7 @@ class Supervisor:
         reasons = list(_refusals(health, self._rules))
         if not confirmed:
             reasons.append("the operator has not agreed (--yes)")
-        if self.state is not State.DISARMED:
+        if self.state is not SafetyState.DISARMED:
             reasons.append(f"the supervisor is {self.state}")
         if reasons:
             latched = health.status is not None and (health.status.fault or health.status.watchdog)
@@ -124,22 +124,22 @@ class Supervisor:
 
     def arm(self, cause: str) -> None:
         """The drives are on and echo what they are sent."""
-        self._go(State.ARMED, "info", cause)
+        self._go(SafetyState.ARMED, "info", cause)
 
     def begin_zeroing(self) -> None:
         """Let the drives be zeroed."""
-        self._go(State.ZEROING, "info", "tension-zero asked for")
+        self._go(SafetyState.ZEROING, "info", "tension-zero asked for")
 
     def end_zeroing(self, cause: str) -> None:
         """Zeroing is over."""
-        self._go(State.DISARMED, "info", cause)
+        self._go(SafetyState.DISARMED, "info", cause)
 
     def run(self) -> None:
         """The first command of the controller is about to be sent."""
-        if self.state is State.ARMED:
-            self._go(State.RUNNING, "info", "first command")
+        if self.state is SafetyState.ARMED:
+            self._go(SafetyState.RUNNING, "info", "first command")
 
-    def watch(self, now: float, health: Health) -> State:
+    def watch(self, now: float, health: Health) -> SafetyState:
         """Look at a cycle and return the state from now on; ``failure`` says why the run must end if it must.
 
         Args:
@@ -150,22 +150,22 @@ class Supervisor:
             return self.state
         doubt = _doubt(health, self._rules)
         if fault := _fault(health.status):
-            self._end(now, State.FAULTED, RigStopError(fault, hint=RESET_HINT))
+            self._end(now, SafetyState.FAULTED, RigStopError(fault, hint=RESET_HINT))
         elif failure := self._reason_to_stop(health):
-            self._end(now, State.STOPPING, failure)
-        elif doubt and self.state is State.RUNNING:
-            self._go(State.HOLDING, "warning", doubt)
-        elif not doubt and self.state is State.HOLDING:
-            self._go(State.RUNNING, "info", "cameras and drives are well again")
+            self._end(now, SafetyState.STOPPING, failure)
+        elif doubt and self.state is SafetyState.RUNNING:
+            self._go(SafetyState.HOLDING, "warning", doubt)
+        elif not doubt and self.state is SafetyState.HOLDING:
+            self._go(SafetyState.RUNNING, "info", "cameras and drives are well again")
         return self.state
 
     def stop(self, now: float, cause: str) -> None:
         """Bring the drives to a controlled stop; nothing happens if they are not armed or stop already."""
         if self.state in _MOVING:
             self._stopping_since = now
-            self._go(State.STOPPING, "info", cause)
+            self._go(SafetyState.STOPPING, "info", cause)
 
-    def rest(self, now: float, health: Health, *, moved: bool) -> State:
+    def rest(self, now: float, health: Health, *, moved: bool) -> SafetyState:
         """Follow a controlled stop to its end.
 
         Args:
@@ -173,27 +173,27 @@ class Supervisor:
             health: What is known; the cameras do not matter any more.
             moved: Whether a drive has moved since the cycle before.
         """
-        if self.state is not State.STOPPING:
+        if self.state is not SafetyState.STOPPING:
             return self.state
         status = None if health.silence > 0.0 else health.status
         waited = now - self._stopping_since
         if fault := _fault(status, enabled=False):
-            self._end(now, State.FAULTED, RigStopError(fault, hint=RESET_HINT))
+            self._end(now, SafetyState.FAULTED, RigStopError(fault, hint=RESET_HINT))
         elif status is not None and not (status.stopping or status.enabled or moved):
-            self._go(State.DISARMED, "info", f"standstill after {waited:.2f} s")
+            self._go(SafetyState.DISARMED, "info", f"standstill after {waited:.2f} s")
         elif waited > self._rules.standstill:
             why = health.trouble if status is None else "the drives are still moving"
             text = (
                 f"no standstill within {waited:.2f} s ({why}); the watchdog of the PLC has to stop the drives"
             )
-            self._end(now, State.FAULTED, DeviceError(text, hint=RESET_HINT))
+            self._end(now, SafetyState.FAULTED, DeviceError(text, hint=RESET_HINT))
         return self.state
 
     def reset(self) -> None:
         """An operator has removed the cause of a fault."""
-        if self.state is State.FAULTED:
+        if self.state is SafetyState.FAULTED:
             self.failure = None
-            self._go(State.DISARMED, "info", "reset by the operator")
+            self._go(SafetyState.DISARMED, "info", "reset by the operator")
 
     def _reason_to_stop(self, health: Health) -> TcrctlError | None:
         rules, status = self._rules, health.status
@@ -215,12 +215,12 @@ class Supervisor:
             return RigStopError(f"the PLC refused {health.refused} set-points in a row: {_refusal(status)}")
         return None
 
-    def _end(self, now: float, state: State, failure: TcrctlError) -> None:
+    def _end(self, now: float, state: SafetyState, failure: TcrctlError) -> None:
         self.failure = self.failure or failure
         self._stopping_since = now
         self._go(state, "error", str(failure))
 
-    def _go(self, state: State, level: str, cause: str) -> None:
+    def _go(self, state: SafetyState, level: str, cause: str) -> None:
         if state not in _NEXT[self.state]:
             raise RuntimeError(f"the supervisor cannot go from {self.state} to {state}: {cause}")
         before, self.state = self.state, state
