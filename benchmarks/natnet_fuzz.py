@@ -23,7 +23,7 @@ from rich.table import Table
 
 from tcr_hardware.emulators import motive_encoder as encoder
 from tcr_hardware.emulators.motive_faults import MotiveFaults
-from tcr_hardware.emulators.motive_scene import Scene
+from tcr_hardware.emulators.motive_markers import TrackedMarkers
 from tcr_hardware.natnet.errors import MalformedPacketError
 from tcr_hardware.natnet.frame_decoder import decode_frame
 from tcr_hardware.natnet.model_decoder import decode_models
@@ -39,14 +39,14 @@ def samples() -> list[tuple[Version, int, bytes]]:
     """Good packets: version, message, payload."""
     names = [f"b{k % 6}.n{k // 6}" for k in range(50)]
     positions = np.random.default_rng(0).normal(size=(50, 3))
-    scene = Scene(names, positions)
+    tracked = TrackedMarkers(names, positions)
     unnamed = MotiveFaults(unlabelled=True)
     found = []
     for version in VERSIONS:
         stamp = encoder.Stamp(1, 0.5, 1, 2, 3, 1e-3, 0)
-        views = [scene.view(positions, faults) for faults in (MotiveFaults(), unnamed)]
-        found += [(Version(*version), 7, encoder.frame(version, stamp, scene, view)) for view in views]
-        found.append((Version(*version), 5, encoder.models(version, scene)))
+        views = [tracked.view(positions, faults) for faults in (MotiveFaults(), unnamed)]
+        found += [(Version(*version), 7, encoder.frame(version, stamp, tracked, view)) for view in views]
+        found.append((Version(*version), 5, encoder.models(version, tracked)))
         info = encoder.server_info("Motive", version, 10_000_000, 1511, False, "239.255.42.99")
         found.append((Version(*version), 1, info))
     found.append((Version(4, 1), 13, struct.pack("<QQ", 1, 2)))

@@ -188,7 +188,7 @@ class Player:
     ) -> None:
         """Take a script; ``notify`` takes what happens, for people."""
         self._motive, self._plcs, self._notify = motive, plcs, notify
-        self._names = motive.scene.names
+        self._names = motive.tracked.names
         self._waiting = list(script.faults)
         self._active: list[tuple[float, Fault]] = []
         self._since: dict[str, float] = {"start": 0.0}

@@ -127,6 +127,6 @@ def test_cameras_change_names_and_version_and_change_them_back(tmp_path, bench):
     made = script(tmp_path, "{at_s: 1, cameras: {renamed: true, version: '3.1'}, for_s: 1}")
     player = Player(made, motive, {"tcr600": plc}, lambda text: None)
     player.play(1.0)
-    assert (motive.scene.names, motive.version) == (("a.1?", "a.2?"), (3, 1))
+    assert (motive.tracked.names, motive.version) == (("a.1?", "a.2?"), (3, 1))
     player.play(2.0)
-    assert (motive.scene.names, motive.version) == (("a.1", "a.2"), (4, 1))
+    assert (motive.tracked.names, motive.version) == (("a.1", "a.2"), (4, 1))

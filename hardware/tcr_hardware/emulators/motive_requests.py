@@ -9,7 +9,7 @@ from typing import Protocol
 from tcr_hardware.emulators import motive_encoder as encoder
 from tcr_hardware.emulators.motive_encoder import Version
 from tcr_hardware.emulators.motive_link import MotiveLink
-from tcr_hardware.emulators.motive_scene import Scene
+from tcr_hardware.emulators.motive_markers import TrackedMarkers
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 
 NAME = "Motive (emulated)"
@@ -26,13 +26,13 @@ class Server(Protocol):
 
     Attributes:
         settings: Settings of the server.
-        scene: Names and bodies.
+        tracked: Names and bodies.
         version: Newest version served now.
         link: Who is connected.
     """
 
     settings: MotiveSettings
-    scene: Scene
+    tracked: TrackedMarkers
     version: Version
     link: MotiveLink
 
@@ -41,7 +41,7 @@ class Server(Protocol):
         ...
 
     def latest(self, version: Version) -> bytes:
-        """The scene now, as one FRAMEOFDATA packet."""
+        """The markers now, as one FRAMEOFDATA packet."""
         ...
 
 
@@ -60,7 +60,7 @@ def answer(server: Server, datagram: bytes, address: tuple[str, int]) -> list[by
     if message == REQUEST:
         return [_request(server, payload, address)]
     if message == REQUEST_MODELDEF:
-        return [encoder.packet(MODELDEF, encoder.models(version, server.scene))]
+        return [encoder.packet(MODELDEF, encoder.models(version, server.tracked))]
     if message == REQUEST_FRAMEOFDATA:
         return [server.latest(version)]
     if message == ECHOREQUEST and len(payload) >= 8 and server.version >= (3, 0):

@@ -18,8 +18,8 @@ FIRST_POINT_CLOUD_ID = 50001
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
-    """A rigid body of the scene: its number, its name, the names of its markers and their rows."""
+class TrackedBody:
+    """A tracked rigid body: its number, its name, the names of its markers and their rows."""
 
     id: int
     name: str
@@ -52,7 +52,7 @@ class View:
     params: NDArray[np.int64]
 
 
-class Scene:
+class TrackedMarkers:
     """Markers with names ``body.marker``; a name without a dot belongs to the body ``markers``.
 
     Attributes:
@@ -69,7 +69,7 @@ class Scene:
         for row, name in enumerate(self.names):
             rows.setdefault(name.rpartition(".")[0] or "markers", []).append(row)
         self.bodies = tuple(
-            Body(k + 1, body, tuple(self.names[row].rpartition(".")[2] for row in of), np.array(of))
+            TrackedBody(k + 1, body, tuple(self.names[row].rpartition(".")[2] for row in of), np.array(of))
             for k, (body, of) in enumerate(rows.items())
         )
         self._row = {name: row for row, name in enumerate(self.names)}
