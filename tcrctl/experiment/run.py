@@ -29,7 +29,7 @@ from tcrctl.experiment.run_folder import (
 )
 from tcrctl.experiment.summary import Summary, Verdict, judge
 from tcrctl.log.file_names import RESOLVED, SPEC
-from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.geometry import CableHoles, LogGeometry
 from tcrctl.log.mcap_file import Opening, Tap
 from tcrctl.log.writer import Flushing, LogWriter
 from tcrctl.loop.interruption import Interruption
@@ -138,7 +138,7 @@ def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeome
     model, routes = robot.model, []
     for c, name in enumerate(robot.cable_names):
         holes = slice(model.first_hole[c], model.first_hole[c + 1])
-        routes.append(CableRoute(name, model.hole_nodes[holes], model.hole_weights[holes]))
+        routes.append(CableHoles(name, model.hole_nodes[holes], model.hole_weights[holes]))
     duration = 0.0 if trajectory is None else trajectory.duration
     points = np.linspace(0.0, duration, min(MOST_PATH_POINTS, 2 + int(duration / PATH_SPACING_S)))
     return LogGeometry(

@@ -19,7 +19,7 @@ from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.geometry import CableHoles, LogGeometry
 from tcrctl.robot.module import rings
 from tcrctl.signals import Array
 
@@ -106,7 +106,7 @@ class Scene:
         return update.SerializeToString()
 
     def _draw_cable(
-        self, update: SceneUpdate, cable: CableRoute, tension: float, nodes: Array, when: Timestamp
+        self, update: SceneUpdate, cable: CableHoles, tension: float, nodes: Array, when: Timestamp
     ) -> None:
         share = min(1.0, max(0.0, tension / self._geometry.full_scale_tension))
         colour = (round(share, 3), 0.1, round(1.0 - share, 3))
