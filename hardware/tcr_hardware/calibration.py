@@ -48,7 +48,7 @@ class MarkerMean:
 
 
 @dataclass(frozen=True, slots=True)
-class Calibration:
+class CalibrationResult:
     """A transform and how well it fits.
 
     Attributes:
@@ -86,7 +86,7 @@ def calibrate(
     level: bool = False,
     max_residual_m: float = 0.002,
     max_tilt_deg: float = 10.0,
-) -> Calibration:
+) -> CalibrationResult:
     """Fit the rigid transform that takes ``measured`` to ``known``, in the least-squares sense.
 
     Three markers of the base ring, 60 mm apart, fix the direction of the robot's axis only to about 1 mm per 0.1 mm
@@ -127,7 +127,7 @@ def calibrate(
         )
     transform = RigidTransform(rotation, translation, scale_m)
     rms = float(np.sqrt((distances**2).mean()))
-    return Calibration(transform, rms, float(distances.max()), tilt, scale_error)
+    return CalibrationResult(transform, rms, float(distances.max()), tilt, scale_error)
 
 
 def _check_spread(places: Array) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tcr_hardware.calibration import Calibration, average, calibrate
+from tcr_hardware.calibration import CalibrationResult, average, calibrate
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.markers import Gate, MarkerMap, NodeMarker
 from tcr_hardware.natnet.client import NatNetClient
@@ -24,7 +24,7 @@ from tcrctl.signals import Array
 BASE = ("base.n1", "base.n2", "base.n3")
 
 
-def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool) -> Calibration:
+def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool) -> CalibrationResult:
     """Measure the base ring and find the transform.
 
     Args:
@@ -80,7 +80,7 @@ def _measured(client: NatNetClient, nodes: list[NodeMarker], seconds: float) -> 
     return mean.mean
 
 
-def calibration_text(found: Calibration) -> str:
+def calibration_text(found: CalibrationResult) -> str:
     """The section ``calibration`` of a rig file, in one line."""
     numbers: dict[str, Any] = found.transform.as_dict()
     rounded = {

@@ -39,7 +39,7 @@ from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, StaticMap, follow, r
 from tcrctl.signals import Array, Estimate
 
 
-class Memory(NamedTuple):
+class MultiStepMemory(NamedTuple):
     """What the predictor keeps from step to step, changed in place.
 
     Attributes:
@@ -57,7 +57,13 @@ class Memory(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _update_offset(
-    model: Model, ws: Workspace, memory: Memory, deviation: Array, v: Array, period: float, blend: float
+    model: Model,
+    ws: Workspace,
+    memory: MultiStepMemory,
+    deviation: Array,
+    v: Array,
+    period: float,
+    blend: float,
 ) -> None:
     """Filter the displacement of the point that the robot vibrates about: δ + K^-1 M (a + α v)."""
     force, lag = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
@@ -74,7 +80,14 @@ def _update_offset(
 
 @njit(cache=True, error_model="numpy")
 def forecast(
-    model: Model, load: Load, ws: Workspace, memory: Memory, now: Now, grid: Grid, tip: int, tuning: Tuning
+    model: Model,
+    load: Load,
+    ws: Workspace,
+    memory: MultiStepMemory,
+    now: Now,
+    grid: Grid,
+    tip: int,
+    tuning: Tuning,
 ) -> tuple[Outcome, bool, Array, Array]:
     """Make one prediction as in the module's docstring, in one kernel.
 
@@ -121,7 +134,7 @@ class MultiStep:
         q, drive = robot.rest.q.copy(), np.zeros(robot.n_cables)
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         basis = response.start_basis(robot.model, self._work, settings.modes)
-        self._memory = Memory(at, still, still.copy(), basis)
+        self._memory = MultiStepMemory(at, still, still.copy(), basis)
         self._solved = False
         self._fresh = settings.offset is not None and settings.offset.from_start
         self._gap = TensionGap(settings.tension_gap, period, robot.n_cables)

@@ -34,7 +34,7 @@ from tcrctl.robot.statics import StaticMap, follow, rest_map, static_outputs
 from tcrctl.signals import Array, Estimate
 
 
-class Memory(NamedTuple):
+class StaticMemory(NamedTuple):
     """What the predictor keeps from step to step, changed in place.
 
     Attributes:
@@ -48,7 +48,14 @@ class Memory(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def forecast(
-    model: Model, load: Load, ws: Workspace, memory: Memory, now: Now, grid: Grid, tip: int, tuning: Tuning
+    model: Model,
+    load: Load,
+    ws: Workspace,
+    memory: StaticMemory,
+    now: Now,
+    grid: Grid,
+    tip: int,
+    tuning: Tuning,
 ) -> tuple[Outcome, Array, Array]:
     """Make one prediction as in the module's docstring, in one kernel.
 
@@ -86,7 +93,7 @@ class Static:
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
         self._tuning = make_tuning(period, settings.filter_s)
         self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
-        self._memory = Memory(rest_map(robot), np.zeros(POSE_ROWS + robot.n_cables))
+        self._memory = StaticMemory(rest_map(robot), np.zeros(POSE_ROWS + robot.n_cables))
         self._solved = False
 
     def sharpen(self) -> None:

@@ -25,7 +25,7 @@ from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.rigid_transform import RigidTransform
-from tcrctl.emulate.fault_script import FaultScript, Player
+from tcrctl.emulate.fault_script import FaultPlayer, FaultScript
 from tcrctl.emulate.imperfections import Imperfections
 from tcrctl.emulate.robot import EmulatedRobot
 from tcrctl.emulate.settings import EmulationSettings
@@ -198,7 +198,7 @@ def emulate(
     Raises:
         DivergenceError: If a simulation broke down.
     """
-    player = Player(script, bench.motive, bench.plcs, notify) if script else None
+    player = FaultPlayer(script, bench.motive, bench.plcs, notify) if script else None
     begun = time.monotonic()
     while not stop():
         if player is not None:

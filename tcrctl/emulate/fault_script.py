@@ -176,7 +176,7 @@ def _strangers(
             yield (*at, "cameras", key), f"there is no marker {', '.join(unknown)}; there are {some}, ..."
 
 
-class Player:
+class FaultPlayer:
     """Lets the faults of a script happen."""
 
     def __init__(

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
-from tcrctl.analysis.skeleton import read_skeleton
+from tcrctl.analysis.structure import read_structure
 from tcrctl.plots import style
 from tcrctl.plots.space import draw_body, equal_scale
 from tcrctl.signals import Array
@@ -43,7 +43,7 @@ def _body(axes: Any, histories: Sequence[History]) -> None:
     shape = histories[0].shape
     if len(shape):
         nodes = 1e3 * shape[len(shape) // 3]
-        draw_body(axes, nodes, read_skeleton(histories[0].log, len(nodes)))
+        draw_body(axes, nodes, read_structure(histories[0].log, len(nodes)))
         shown.append(nodes)
     for i, path in enumerate(paths):
         axes.plot(*path.T, **style.line(i))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.analysis.history import History
-from tcrctl.analysis.skeleton import read_skeleton
+from tcrctl.analysis.structure import read_structure
 from tcrctl.robot.module import NODES, module_count
 from tcrctl.signals import Array
 
@@ -114,7 +114,7 @@ def _robot(history: History) -> dict[str, Any] | None:
     frames = _frames(history)
     nodes = history.shape[frames]
     middle, scale = _grid(nodes)
-    skeleton = read_skeleton(history.log, nodes.shape[1])
+    structure = read_structure(history.log, nodes.shape[1])
     return {
         "t": _floats(history.t[history.shape_step[frames]]),
         "count": nodes.shape[1],
@@ -122,17 +122,17 @@ def _robot(history: History) -> dict[str, Any] | None:
         "nodes": _bytes(np.round((nodes - middle) / scale).astype("<i2")),
         "middle": middle.tolist(),
         "scale": scale,
-        "tip": module_count(nodes.shape[1]) if skeleton is None else skeleton.tip_ring,
-        "springs": [] if skeleton is None else skeleton.springs.tolist(),
+        "tip": module_count(nodes.shape[1]) if structure is None else structure.tip_ring,
+        "springs": [] if structure is None else structure.springs.tolist(),
         "cables": []
-        if skeleton is None
+        if structure is None
         else [
             {
                 "name": cable.name,
                 "nodes": cable.nodes.tolist(),
                 "weights": np.round(cable.weights, 6).tolist(),
             }
-            for cable in skeleton.cables
+            for cable in structure.cables
         ],
     }
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from support.structured_text import FunctionBlock
 from tcr_hardware.emulators.plc_program import PlcCommand, PlcLimitSettings, PlcProgram
 from tcr_hardware.modbus.document import register_map_markdown
-from tcr_hardware.modbus.registers import Control, Fault, Reject, Status, register_map
+from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status, register_map
 from tcr_hardware.servo import ServoSettings
 
 PLC = Path(__file__).parents[2] / "hardware" / "plc"
@@ -36,7 +36,7 @@ def test_the_document_names_every_register_and_bit():
         *(bit.name for bits in (Control, Status) for bit in bits),
     ]:
         assert f"`{name}`" in text
-    for value in [*Reject, *Fault]:
+    for value in [*Reject, *FaultCode]:
         assert value.name.lower().replace("_", " ") in text.lower()
 
 
@@ -121,7 +121,7 @@ def test_both_plcs_trip_stop_and_reset_alike(armed):
         armed.write(FOLLOW, (3_000 * k, -3_000 * k, 0, 0, 0, 0), 90_000)
         armed.run(20)
     armed.run(200)
-    assert armed.emulated.fault is Fault.WATCHDOG
+    assert armed.emulated.fault is FaultCode.WATCHDOG
     armed.write(Control.RUN | Control.RESET, (0,) * 6)
     armed.run(5)
     armed.write(ON, (0,) * 6)
@@ -131,7 +131,7 @@ def test_both_plcs_trip_stop_and_reset_alike(armed):
     for k in range(1, 8):
         armed.write(FOLLOW, (21_000, -21_000, 0, 2_000 * k, 0, 0), 90_000)
         armed.run(20)
-    assert armed.emulated.fault is Fault.FOLLOWING_ERROR
+    assert armed.emulated.fault is FaultCode.FOLLOWING_ERROR
 
 
 def test_both_plcs_refuse_to_enable_before_the_zero_is_taken():
@@ -152,7 +152,7 @@ def test_both_plcs_clear_a_fault_only_after_its_cause_is_gone(armed, cause):
         armed.run(2)
         armed.write(Control.RUN | Control.RESET, (0,) * 6)
         armed.run(2)
-        assert (armed.emulated.fault is Fault.NONE) == gone
+        assert (armed.emulated.fault is FaultCode.NONE) == gone
 
 
 def moving(both):

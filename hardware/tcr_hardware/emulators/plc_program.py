@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tcr_hardware.modbus.registers import Control, Fault, Reject, Status
+from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status
 from tcr_hardware.servo import Servo, ServoSettings
 
 #: Set-points are spread over the time between the last two sets, within these bounds [s].
@@ -107,7 +107,7 @@ class PlcProgram:
         self.cycle = self.seq_ack = self.heartbeat_echo = 0
         self._seq_seen, self._silence_s, self._since_set_s = 0, 0.0, LONGEST_INTERVAL_S
         self._control = Control(0)
-        self.fault, self.watchdog, self.following_error, self._tripped = Fault.NONE, False, False, False
+        self.fault, self.watchdog, self.following_error, self._tripped = FaultCode.NONE, False, False, False
         self.enabled = self.stopping = self._following = self.limited = False
         self.reject = (Reject.NONE, 0)
         self.active = self.positions()
@@ -127,7 +127,7 @@ class PlcProgram:
             (Status.READY, self._ready()),
             (Status.ZEROED, self.zeroed),
             (Status.ENABLED, self.enabled),
-            (Status.FAULT, self.fault is not Fault.NONE),
+            (Status.FAULT, self.fault is not FaultCode.NONE),
             (Status.ESTOP, self.estop),
             (Status.STOPPING, self.stopping),
             (Status.FOLLOWING_ERROR, self.following_error),
@@ -170,23 +170,23 @@ class PlcProgram:
         self._silence_s = 0.0 if alive else self._silence_s + dt
         if self.enabled and 1e3 * self._silence_s >= self._limits.watchdog_ms:
             self.watchdog = True
-            self._trip(Fault.WATCHDOG)
+            self._trip(FaultCode.WATCHDOG)
 
     def _find_faults(self) -> None:
         """Faults of the machine itself."""
         if self.estop:
-            self._trip(Fault.ESTOP)
+            self._trip(FaultCode.ESTOP)
         if self.drive_lost:
-            self._trip(Fault.DRIVE)
+            self._trip(FaultCode.DRIVE)
         for axis, at in enumerate(self.positions()):
             if abs(self.active[axis] - at) > self._limits.following_um:
                 self.following_error = True
                 self.active[axis], self._speed[axis] = at, 0.0  # no jump when the axis comes free
-                self._trip(Fault.FOLLOWING_ERROR)
+                self._trip(FaultCode.FOLLOWING_ERROR)
 
-    def _trip(self, fault: Fault) -> None:
+    def _trip(self, fault: FaultCode) -> None:
         """Latch a fault, which stops; the first fault stays the one reported."""
-        if self.fault is Fault.NONE:
+        if self.fault is FaultCode.NONE:
             self.fault = fault
         self._tripped = True
 
@@ -198,7 +198,7 @@ class PlcProgram:
     def _reset(self) -> None:
         """Acknowledge a fault, once its cause is gone and everything stands."""
         if not (self.estop or self.drive_lost or self._moving()):
-            self.fault, self.watchdog, self.following_error = Fault.NONE, False, False
+            self.fault, self.watchdog, self.following_error = FaultCode.NONE, False, False
 
     def _zero(self) -> None:
         """Take the present positions as zero."""
@@ -210,7 +210,7 @@ class PlcProgram:
 
     def _ready(self) -> bool:
         """Whether an ENABLE edge would be obeyed, given RUN."""
-        return self.fault is Fault.NONE and self.zeroed and not self.stopping
+        return self.fault is FaultCode.NONE and self.zeroed and not self.stopping
 
     def _permit(self, command: PlcCommand, rising: Control) -> None:
         """Enable on the edge, with the set-points that the drives hold already; stop without ENABLE or RUN."""

@@ -11,7 +11,7 @@ from enum import IntEnum, IntFlag
 from tcr_hardware.modbus.registers import (
     MAP_VERSION,
     Control,
-    Fault,
+    FaultCode,
     Register,
     RegisterMap,
     Reject,
@@ -56,11 +56,11 @@ REJECT = {
     Reject.ESTOP: "estop: the e-stop is pressed",
 }
 FAULT = {
-    Fault.NONE: "none",
-    Fault.WATCHDOG: "watchdog: `HEARTBEAT` did not change within `WD_MS` while operation was enabled",
-    Fault.ESTOP: "estop: the e-stop was pressed",
-    Fault.FOLLOWING_ERROR: "following error",
-    Fault.DRIVE: "drive: the field bus to the drives was down",
+    FaultCode.NONE: "none",
+    FaultCode.WATCHDOG: "watchdog: `HEARTBEAT` did not change within `WD_MS` while operation was enabled",
+    FaultCode.ESTOP: "estop: the e-stop was pressed",
+    FaultCode.FOLLOWING_ERROR: "following error",
+    FaultCode.DRIVE: "drive: the field bus to the drives was down",
 }
 RULES = """\
 # Register map

@@ -66,7 +66,7 @@ class Reject(IntEnum):
     ESTOP = 5
 
 
-class Fault(IntEnum):
+class FaultCode(IntEnum):
     """Values of FAULT: why the PLC stopped by itself."""
 
     NONE = 0

@@ -16,7 +16,7 @@ from tcrctl.robot.module import node_count, node_index, ring_nodes
 
 
 @dataclass(frozen=True, slots=True)
-class Skeleton:
+class Structure:
     """Which nodes are joined; node rows as in the notation table (:mod:`tcrctl`).
 
     Attributes:
@@ -32,7 +32,7 @@ class Skeleton:
     tip_ring: int
 
 
-def read_skeleton(log: Log, n_nodes: int) -> Skeleton | None:
+def read_structure(log: Log, n_nodes: int) -> Structure | None:
     """Find what joins the nodes of a logged robot.
 
     Args:
@@ -48,7 +48,7 @@ def read_skeleton(log: Log, n_nodes: int) -> Skeleton | None:
         return None
     springs = spring_list(robot)
     ends = [[node_index(name) for name in spring.nodes] for spring in springs]
-    return Skeleton(
+    return Structure(
         springs=np.array(ends, dtype=np.int64).reshape(-1, 2),
         natural_length=np.array([spring.natural_length for spring in springs]),
         cables=tuple(
