@@ -141,12 +141,12 @@ def _add_bars(q: Array, nodes: np.ndarray, bars: Array, w: float, before: Array,
 
 
 @njit(cache=True, error_model="numpy")
-def _pull(r: Array, nodes: np.ndarray, weights: Array, h: int, T: float, e: Array) -> None:
-    """Add tension T along e, the direction of the stretch before, at hole ``h`` to the residual."""
+def _pull(r: Array, nodes: np.ndarray, weights: Array, hole: int, T: float, e: Array) -> None:
+    """Add tension T along e, the direction of the stretch before, at ``hole`` to the residual."""
     for i in range(3):
-        f = T * weights[h, i]
+        f = T * weights[hole, i]
         if f != 0.0:
-            _add_force(r, nodes[h, i], f * e[0], f * e[1], f * e[2])
+            _add_force(r, nodes[hole, i], f * e[0], f * e[1], f * e[2])
 
 
 @njit(cache=True, error_model="numpy")
@@ -154,13 +154,13 @@ def _group_row(model: Model, s: Stretches, start: int, end: int, row: Array) -> 
     """Fill ``row`` (3 n_nodes,) with the gradient of the length of stretches ``start`` .. ``end``."""
     for k in range(row.shape[0]):
         row[k] = 0.0
-    for h in range(start, end + 1):
+    for stretch in range(start, end + 1):
         for side in range(2):
-            sign, hole = 2.0 * side - 1.0, h - 1 + side
+            sign, hole = 2.0 * side - 1.0, stretch - 1 + side
             for i in range(3):
                 f, node = sign * model.hole_weights[hole, i], 3 * model.hole_nodes[hole, i]
                 for a in range(3):
-                    row[node + a] += f * s.direction[h, a]
+                    row[node + a] += f * s.direction[stretch, a]
 
 
 @njit(cache=True, error_model="numpy")
@@ -189,11 +189,11 @@ def _add_rubbing(model: Model, q: Array, drive: Array, slip: Slip, s: Stretches,
     s.groups[0] = 0
     for c in range(drive.shape[0]):
         ws.tension[c], ws.length[c] = s.tension[first[c]], cables[c, sliding_cable.LEAD]
-        for h in range(first[c] + 1, first[c + 1]):
-            ws.length[c] += s.length[h]
-            s.axial[h] = 0.0
-            _pull(ws.r, model.hole_nodes, model.hole_weights, h, s.tension[h], s.direction[h])
-            _pull(ws.r, model.hole_nodes, model.hole_weights, h - 1, -s.tension[h], s.direction[h])
+        for hole in range(first[c] + 1, first[c + 1]):
+            ws.length[c] += s.length[hole]
+            s.axial[hole] = 0.0
+            _pull(ws.r, model.hole_nodes, model.hole_weights, hole, s.tension[hole], s.direction[hole])
+            _pull(ws.r, model.hole_nodes, model.hole_weights, hole - 1, -s.tension[hole], s.direction[hole])
         _add_groups(model, c, ws, s)
     return energy
 

@@ -40,7 +40,7 @@ class Model(NamedTuple):
         bar_nodes: End nodes of rods, ring sides and springs (n_bars, 2).
         bars: Their parameters (n_bars, 4), columns as in elements.bar.
         first_hole: Holes of cable c are first_hole[c] .. first_hole[c + 1] - 1 (m + 1,).
-        hole_nodes: Ring nodes that carry hole h (n_holes, 3).
+        hole_nodes: Ring nodes that carry each hole (n_holes, 3).
         hole_weights: Their weights (n_holes, 3), see elements.torus.
         cables: Cable parameters (m, 4), columns as in elements.sliding_cable.
     """

@@ -46,8 +46,8 @@ def segment_distance(
 ) -> float:
     """Distance of a segment to a plate, by branch and bound.
 
-    The distance to the plate changes along the segment by no more than the length gone. A part with half length h
-    whose middle has the distance D holds nothing nearer than D - h: it is halved as long as that could matter.
+    The distance to the plate changes along the segment by no more than the length gone. A part with half length r
+    whose middle has the distance D holds nothing nearer than D - r: it is halved as long as that could matter.
 
     Args:
         start: In the plate's frame (3,) [m].

@@ -259,9 +259,12 @@ def test_labels_are_as_short_as_they_can_be(folder):
 
     a, b = run("a", "x_aaaa", "letter_t"), run("b", "x_bbbb", "heart")
     c, d = run("c", "x_cccc", "heart", "seed=2"), run("d", "x_dddd", "heart", "seed=2")
-    assert [h.label for h in read_histories([a, b])] == ["letter_t", "heart"]
-    assert [h.label for h in read_histories([b, c])] == ["heart", "heart seed=2"]
-    assert [h.label for h in read_histories([c, d])] == ["heart seed=2 (cccc)", "heart seed=2 (dddd)"]
+    assert [history.label for history in read_histories([a, b])] == ["letter_t", "heart"]
+    assert [history.label for history in read_histories([b, c])] == ["heart", "heart seed=2"]
+    assert [history.label for history in read_histories([c, d])] == [
+        "heart seed=2 (cccc)",
+        "heart seed=2 (dddd)",
+    ]
 
 
 def test_a_span_of_time_and_a_cut_log_show_what_is_there(tmp_path):
