@@ -154,20 +154,20 @@ class SafetyLimitError(StoppedError):
 
 
 class DivergenceError(StoppedError):
-    """The simulated plant could not complete a time step.
+    """The simulated plant could not complete an internal step.
 
     Attributes:
         time: Simulated time [s].
         residual: Largest remaining nodal force [N].
-        smallest_step: Smallest time step that was tried [s].
+        smallest_h: Smallest internal step that was tried [s].
     """
 
-    def __init__(self, time: float, residual: float, smallest_step: float) -> None:
+    def __init__(self, time: float, residual: float, smallest_h: float) -> None:
         super().__init__(
             f"the simulated plant did not converge at t = {time:.4f} s: residual {residual:.3g} N "
-            f"with sub-steps down to {smallest_step:.2g} s"
+            f"with sub-steps down to {smallest_h:.2g} s"
         )
-        self.time, self.residual, self.smallest_step = time, residual, smallest_step
+        self.time, self.residual, self.smallest_h = time, residual, smallest_h
 
 
 class RunInterruptedError(TcrctlError):

@@ -85,7 +85,7 @@ class Servo:
         """Cable taken in [um]."""
         return self._settings.zero_error_um + (1.0 + self._settings.radius_error) * self.shaft
 
-    def step(self, setpoint: float, dt: float) -> None:
+    def advance(self, setpoint: float, dt: float) -> None:
         """Follow a set-point [um] for ``dt`` [s].
 
         The wanted speed is error / lag, never more than what the drive can still brake from before the set-point,

@@ -62,7 +62,7 @@ class LiteralIoc:
     Attributes:
         ahead: The one prediction instant (1,) [s].
         blocks: One block of inputs.
-        gain: ∂q/∂d where the iteration was linearised last (12 n_modules, m).
+        gain: ∂q/∂d where the iteration was linearised last (n_free, m).
     """
 
     extrapolates = anti_windup = False
@@ -91,12 +91,12 @@ class LiteralIoc:
         return q0, Load(inertia, 2.0 / period, nodal, bars, cables, None)
 
     def _linearise(self, q: Array, drive: Array, load: Load, speed: Array) -> tuple[Array, Prediction]:
-        """Newton step (12 n_modules,) at the present input, and the outputs as (31)."""
+        """Newton step (n_free,) at the present input, and the outputs as (31)."""
         period, tip, ws = self._settings.period_s, self._robot.tip, self._work
         assemble(self._robot.model, q, drive, load, ws, True)
         linear.factor_shifted(ws.K, ws.U)
-        step = np.zeros(ws.r.shape[0])
-        linear.solve(ws, -ws.r, step)
+        change = np.zeros(ws.r.shape[0])
+        linear.solve(ws, -ws.r, change)
         linear.drive_gain(ws, self.gain)
         first, m = 3 * (tip - FIXED), speed.shape[0]
         C = pose.output_matrix(q, tip)
@@ -104,17 +104,17 @@ class LiteralIoc:
         gain[0, :POSE_ROWS] = period * (C @ self.gain[first : first + 9])
         gain[0, POSE_ROWS:] = period * linear.tension_gain(ws, self.gain)
         now = np.concatenate([pose.position(q, tip), pose.normal(q, tip), [pose.twist(q, tip)], ws.tension])
-        now[:POSE_ROWS] += C @ step[first : first + 9]
-        now[POSE_ROWS:] += ws.axial * (ws.G[:, 3 * FIXED :] @ step)
-        return step, Prediction((now - gain[0] @ speed)[None], gain)
+        now[:POSE_ROWS] += C @ change[first : first + 9]
+        now[POSE_ROWS:] += ws.axial * (ws.G[:, 3 * FIXED :] @ change)
+        return change, Prediction((now - gain[0] @ speed)[None], gain)
 
     def _iterate(self, q: Array, speed: Array, fixed: Fixed) -> tuple[Array, Solution]:
-        """(28) with (36): change of the free coordinates (12 n_modules,), and the new input with proof."""
+        """(28) with (36): change of the free coordinates (n_free,), and the new input with proof."""
         period = self._settings.period_s
-        step, prediction = self._linearise(q, fixed.drive + period * speed, fixed.load, speed)
+        change, prediction = self._linearise(q, fixed.drive + period * speed, fixed.load, speed)
         program = build_ioc(prediction, fixed.target, fixed.previous, fixed.low, fixed.high, self._weights)
         solution = solve_ioc(program, prediction, self._weights)
-        return step + period * (self.gain @ (solution.inputs - speed)), solution
+        return change + period * (self.gain @ (solution.inputs - speed)), solution
 
     def sharpen(self) -> None:
         """Nothing to do: (41) always ends with a whole Newton step."""

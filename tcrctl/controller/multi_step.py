@@ -46,7 +46,7 @@ class MultiStepMemory(NamedTuple):
         at: Where the model is at rest.
         offset: Δ (3 n_nodes,) [m].
         v: Velocities of the last estimate (3 n_nodes,) [m/s].
-        basis: Basis of the response (12 n_modules, modes + m).
+        basis: Basis of the response (n_free, modes + m).
     """
 
     at: StaticMap

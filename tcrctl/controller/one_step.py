@@ -58,12 +58,12 @@ class OneStep:
 
     def _load(self, q: Array, v: Array, drive: Array) -> Load:
         """Return the load of backward Euler over the horizon from (q, v, d)."""
-        step, s = self._horizon, self._scratch
-        inertia = 1.0 / step**2 + self._robot.model.damping / step
-        s.nodal[Q_FREE] = q + v / (step * inertia)
+        horizon, s = self._horizon, self._scratch
+        inertia = 1.0 / horizon**2 + self._robot.model.damping / horizon
+        s.nodal[Q_FREE] = q + v / (horizon * inertia)
         s.nodal[FORCE] = self._robot.weight
         dynamics.lengths_before(self._robot.model, q, v, drive, np.zeros_like(drive), 0.0, s, self._work)
-        return Load(inertia, 1.0 / step, s.nodal, s.bar_before, s.cable_before, None)
+        return Load(inertia, 1.0 / horizon, s.nodal, s.bar_before, s.cable_before, None)
 
     def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""

@@ -2,7 +2,7 @@
 
 The cable is a chain of stretches: stretch i ends at hole i (stretch 0 is the lead, from the actuator to the base
 ring), and material may slip through every hole but the last, which is the anchor. With the elongation e_i of a
-stretch at slips that have not moved, and the slips s_i of one time step, the incremental potential of a cable is
+stretch at slips that have not moved, and the slips s_i of one internal step, a cable's incremental potential is
 
     min_s  Σ_i k_i/2 (e_i + s_i - s_(i-1))₊²  +  Σ_i F_i |s_i|,     F_i = min(T_i, T_(i+1)) (exp(μ θ_i) - 1) + drag
 
@@ -36,7 +36,7 @@ class Slip(NamedTuple):
         rest: Its unstretched length [m].
         tension: Its tension T_i [N].
         cap: F_i, largest difference of tension across hole i [N].
-        before: Elongations at the start of the step [m], for the damper.
+        before: Elongations at the start of the internal step [m], for the damper.
         rate: 1 element: w of backward Euler, dl/dt = w (e - before) [1/s]; 0 in statics.
     """
 
@@ -184,7 +184,7 @@ def tensions(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) ->
     """Fill tensions of all stretches from their lengths; returns the incremental potential of all cables [J].
 
     Args:
-        slip: State at the start of the step.
+        slip: State at the start of the internal step.
         cables: Parameters (m, 4), columns as in ``sliding_cable``; the damper acts on every stretch with c / k.
         first_hole: First hole of every cable, and the end (m + 1,).
         s: Lengths in, tensions out.
@@ -225,14 +225,14 @@ def group_stiffness(s: Stretches, start: int, end: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def begin(slip: Slip, h: float, lead: Array, first_hole: np.ndarray, s: Stretches) -> None:
-    """Start a step of size ``h`` [s]: elongations before it, and the caps of the holes there.
+    """Start an internal step of size ``h`` [s]: elongations before it, and the caps of the holes there.
 
     Args:
         slip: State; its before, cap and rate are filled.
-        h: Step [s].
+        h: Internal step [s].
         lead: Unit vector from the actuators to the base ring (3,).
         first_hole: First hole of every cable, and the end (m + 1,).
-        s: Lengths and directions at the start of the step.
+        s: Lengths and directions at the start of the internal step.
     """
     slip.rate[0] = 1.0 / h
     for c in range(first_hole.shape[0] - 1):
@@ -250,7 +250,7 @@ def begin(slip: Slip, h: float, lead: Array, first_hole: np.ndarray, s: Stretche
 
 @njit(cache=True, error_model="numpy")
 def finish(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) -> float:
-    """Move the material through the holes to the end of a step; returns the work of friction Σ F |s| [J].
+    """Move the material through the holes to the end of an internal step; returns the work of friction Σ F |s| [J].
 
     A hole that sticks lets nothing through; a slack stretch takes what comes if it can.
     """

@@ -72,10 +72,10 @@ class Evaluator:
             return found
         beside = self.regression.difference_points(x)
         columns = []
-        for (_, step), there in zip(beside, self.predict_many([p for p, _ in beside]), strict=True):
+        for (_, deviation), there in zip(beside, self.predict_many([p for p, _ in beside]), strict=True):
             if there is None:
                 raise NoEquilibriumError("a sensitivity", np.nan, 0.0, 0)
-            columns.append((there - predicted) / step)
+            columns.append((there - predicted) / deviation)
         return np.stack(columns, axis=2)
 
     def count(self, number: int) -> None:

@@ -25,8 +25,8 @@ from tcrctl.robot.robot import build_robot
 from tcrctl.signals import Array
 
 MM = 1e3
-#: Step of finite differences in the unit cube, for logs.
-UNIT_STEP = 2e-3
+#: Deviation of finite differences in the unit cube, for logs.
+UNIT_DEVIATION = 2e-3
 _QUARTERS = 4
 
 
@@ -40,7 +40,7 @@ class Regression:
         configurations: Static data.
         recordings: Logs.
         reference: Configuration that displacements are taken from; empty for positions.
-        step: Internal time step of logs [s].
+        h: Internal step of simulated logs [s].
     """
 
     robot: RobotDescription
@@ -48,7 +48,7 @@ class Regression:
     configurations: tuple[Configuration, ...]
     recordings: tuple[Recording, ...]
     reference: str
-    step: float
+    h: float
 
     @cached_property
     def measured(self) -> Array:
@@ -110,7 +110,7 @@ class Regression:
         parts = []
         for c, q in zip(self.configurations, rest_shapes(robot, self._drives), strict=True):
             parts.append(q.reshape(-1, 3)[np.array(c.rows)].mean(axis=1))
-        parts += [marker_motion(robot, recording, self.step).reshape(-1, 3) for recording in self.recordings]
+        parts += [marker_motion(robot, recording, self.h).reshape(-1, 3) for recording in self.recordings]
         return self.relative(np.concatenate(parts))
 
     def static_slopes(self, x: Array) -> Array:
@@ -132,13 +132,13 @@ class Regression:
         return self.relative(np.concatenate(parts))
 
     def difference_points(self, x: Array) -> list[tuple[Array, float]]:
-        """Points beside ``x`` in the unit cube and signed steps, one per parameter, for finite differences."""
+        """Points beside ``x`` in the unit cube and signed deviations, one per parameter, for finite differences."""
         points = []
         for j in range(len(x)):
-            step = UNIT_STEP if x[j] + UNIT_STEP <= 1.0 else -UNIT_STEP
+            deviation = UNIT_DEVIATION if x[j] + UNIT_DEVIATION <= 1.0 else -UNIT_DEVIATION
             beside = x.copy()
-            beside[j] += step
-            points.append((beside, step))
+            beside[j] += deviation
+            points.append((beside, deviation))
         return points
 
     @cached_property

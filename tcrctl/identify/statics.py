@@ -54,23 +54,23 @@ class Twins(NamedTuple):
     Attributes:
         below: The parameter is a little smaller.
         above: It is a little larger.
-        step: Distance between the two, in the parameter's unit.
+        apart: Distance between the two, in the parameter's unit.
     """
 
     below: Side
     above: Side
-    step: float
+    apart: float
 
     def force_slope(self, q: Array, drive: Array) -> Array:
-        """∂r/∂ζ (12 n_modules,) at the shape ``q`` (3 n_nodes,) and ``drive`` (m,)."""
+        """∂r/∂ζ (n_free,) at the shape ``q`` (3 n_nodes,) and ``drive`` (m,)."""
         low, high = (_at(side, q, drive).r for side in (self.below, self.above))
-        slope: Array = (high - low) / self.step
+        slope: Array = (high - low) / self.apart
         return slope
 
     @property
     def base_slope(self) -> Array:
         """How the base moves (12,)."""
-        return (self.above.base - self.below.base) / self.step
+        return (self.above.base - self.below.base) / self.apart
 
 
 def rest_shapes(robot: Robot, drives: Array) -> Array:

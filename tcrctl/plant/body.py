@@ -68,7 +68,7 @@ class Body:
             t: Time, for messages [s].
 
         Raises:
-            DivergenceError: If a time step did not converge.
+            DivergenceError: If an internal step did not converge.
         """
         converged, residual, smallest, _ = dynamics.advance(
             self.model, self.state, speed, duration, self._rule, force, self._work, self._scratch
@@ -86,7 +86,7 @@ class Body:
         if self._hysteresis is not None:
             self._hysteresis.give_way(self.state.q)
         if self._creep is not None:
-            grown, slip = self._creep.step(self._elastic(), h), self.state.slip
+            grown, slip = self._creep.grow(self._elastic(), h), self.state.slip
             if slip is None:
                 self.late += grown
             else:

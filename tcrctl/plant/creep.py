@@ -31,7 +31,7 @@ class Creep:
         self._time = np.array([branch.time_s for branch in branches])
         self.late = np.outer(self._strength, elastic)
 
-    def step(self, elastic: Array, h: float) -> Array:
+    def grow(self, elastic: Array, h: float) -> Array:
         """Return by how much unstretched lengths grow (n,) [m] in ``h`` [s] under elongations T / k (n,) [m]."""
         share = -np.expm1(-h / self._time)
         grown = share[:, None] * (np.outer(self._strength, elastic) - self.late)

@@ -63,7 +63,7 @@ class Reality:
         """
         self.drives, self._body, self._rows = drives, body, rows
         self._count = steps(settings, period)
-        self._step = period / self._count
+        self._h = period / self._count
         self.cameras = ImperfectCameras(
             settings.cameras or CameraSettings(),
             rows.size,
@@ -82,9 +82,9 @@ class Reality:
             t: Time at its beginning [s].
 
         Raises:
-            DivergenceError: If a time step did not converge.
+            DivergenceError: If an internal step did not converge.
         """
-        h = self._step
+        h = self._h
         for i in range(self._count):
             self._body.follow(self.drives.move(speed), h, force, t + i * h)
             self._watch(t + (i + 1) * h)

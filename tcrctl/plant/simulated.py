@@ -99,7 +99,7 @@ class SimulatedPlant:
         """Move the drives at ``command.speed`` for one period; drives stop at the ends of their stroke.
 
         Raises:
-            DivergenceError: If a time step did not converge.
+            DivergenceError: If an internal step did not converge.
         """
         force = pushed(self.robot.weight, self._pushes, self.time)
         if self.reality is not None:

@@ -46,7 +46,7 @@ class SpringHysteresis:
         self.model = model._replace(bars=seen, bar_nodes=nodes)
 
     def give_way(self, q: Array) -> float:
-        """Cut forces down after a time step that ended at ``q`` (3 n_nodes,) [m]; return the energy lost [J]."""
+        """Cut forces down after an internal step to ``q`` (3 n_nodes,) [m]; return the energy lost [J]."""
         stretch = self._lengths(q) - self._own[:, bar.REST]
         held = np.clip(stretch, -self.yield_length, self.yield_length)
         self._own[:, bar.REST] += stretch - held

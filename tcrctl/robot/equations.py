@@ -56,12 +56,12 @@ class Workspace(NamedTuple):
     Attributes:
         K: Block-banded part of the tangent (n_modules, w + 1, 12, 12) [N/m].
         U: Its Cholesky factor, same shape.
-        r: Residual of (*) for the free coordinates (12 n_modules,) [N].
+        r: Residual of (*) for the free coordinates (n_free,) [N].
         G: ∂l/∂q (m, 3 n_nodes); of groups of stretches where cables rub.
         tension: λ (m,) [N]; that at the drives where cables rub.
         axial: k_c = ∂λ/∂(l + d) of taut cables, 0 of slack ones (m,) [N/m].
         length: Path lengths l (m,) [m].
-        columns: Cable columns and right-hand side of ``linear.couple`` (12 n_modules, m + 1).
+        columns: Cable columns and right-hand side of ``linear.couple`` (n_free, m + 1).
         small: Its factor of the cable coupling (m, m).
         stretches: Of cables that rub; None without friction.
     """

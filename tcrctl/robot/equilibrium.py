@@ -35,7 +35,7 @@ class Equilibrium(NamedTuple):
         q: Node positions (3 n_nodes,) [m].
         tension: Cable tensions λ (m,) [N].
         length: Path lengths (m,) [m].
-        gain: ∂q/∂d, static response of the free coordinates to the drives (12 n_modules, m).
+        gain: ∂q/∂d, static response of the free coordinates to the drives (n_free, m).
         iterations: Newton iterations of the last solve.
         residual: Largest nodal force left [N].
     """

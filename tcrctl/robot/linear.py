@@ -103,7 +103,7 @@ def couple(ws: Workspace, b: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _finish(ws: Workspace, X: Array) -> None:
-    """Overwrite X (12 n_modules, r) by U^-1 (I - W P^-1 W') X."""
+    """Overwrite X (n_free, r) by U^-1 (I - W P^-1 W') X."""
     m, size, r = ws.axial.shape[0], X.shape[0], X.shape[1]
     weight = np.zeros((m, r))
     for k in range(size):
@@ -125,8 +125,8 @@ def solve(ws: Workspace, b: Array, x: Array) -> None:
 
     Args:
         ws: U, G and axial stiffness at one configuration.
-        b: Right-hand side (12 n_modules,).
-        x: Output (12 n_modules,).
+        b: Right-hand side (n_free,).
+        x: Output (n_free,).
     """
     couple(ws, b)
     m = ws.axial.shape[0]
@@ -140,7 +140,7 @@ def solve(ws: Workspace, b: Array, x: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def solve_many(ws: Workspace, X: Array) -> None:
-    """Overwrite columns X (12 n_modules, r) by A^-1 X; ``columns`` and ``small`` as :func:`couple` left them."""
+    """Overwrite columns X (n_free, r) by A^-1 X; ``columns`` and ``small`` as :func:`couple` left them."""
     block_banded.solve_forward(ws.U, X)
     _finish(ws, X)
 
@@ -151,7 +151,7 @@ def drive_gain(ws: Workspace, gain: Array) -> None:
 
     Args:
         ws: U, G and axial stiffness; ``columns`` and ``small`` as :func:`couple` left them.
-        gain: Output (12 n_modules, m); the sensitivity of the free coordinates to the drives.
+        gain: Output (n_free, m); the sensitivity of the free coordinates to the drives.
     """
     m = ws.axial.shape[0]
     for c in range(m):

@@ -99,7 +99,7 @@ def drive_gain(q: Array, gain: Array, ring: int) -> Array:
 
     Args:
         q: Node positions (3 n_nodes,) [m].
-        gain: Derivatives of the free coordinates by the drives (12 n_modules, m).
+        gain: Derivatives of the free coordinates by the drives (n_free, m).
         ring: Row of the ring's first node, not that of the base.
     """
     first = 3 * (ring - FIXED)

@@ -57,7 +57,7 @@ def _largest(x: Array) -> float:
 def _search(
     model: Model, q: Array, drive: Array, load: Load, ws: Workspace, p: Array, start: float
 ) -> tuple[bool, float]:
-    """Move ``q`` along ``p`` (12 n_modules,) until Armijo's rule holds; returns (found, potential there)."""
+    """Move ``q`` along ``p`` (n_free,) until Armijo's rule holds; returns (found, potential there)."""
     slope = 0.0
     for i in range(p.shape[0]):
         slope += ws.r[i] * p[i]

@@ -51,7 +51,7 @@ class Release(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def mass_columns(mass: Array, X: Array, out: Array) -> None:
-    """out = M X for columns X (12 n_modules, r)."""
+    """out = M X for columns X (n_free, r)."""
     for k in range(X.shape[0]):
         i, a = k // SIZE, k % SIZE
         for c in range(X.shape[1]):
@@ -65,7 +65,7 @@ def mass_columns(mass: Array, X: Array, out: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _orthonormalise(mass: Array, V: Array, MV: Array) -> None:
-    """Gram-Schmidt in the mass inner product on the columns of V (12 n_modules, r); fills MV = M V.
+    """Gram-Schmidt in the mass inner product on the columns of V (n_free, r); fills MV = M V.
 
     Dependent columns become zero. Rows of the transposed copies are vectors, so that inner loops are contiguous.
     """
@@ -99,7 +99,7 @@ def refine_basis(model: Model, ws: Workspace, V: Array) -> None:
     Args:
         model: Robot arrays.
         ws: K, U, G at a stable equilibrium, with :func:`tcrctl.robot.linear.couple` done.
-        V: Basis (12 n_modules, modes + m), changed.
+        V: Basis (n_free, modes + m), changed.
     """
     m, size = ws.axial.shape[0], V.shape[0]
     MV = np.empty(V.shape)
@@ -179,7 +179,7 @@ def respond(
         ahead: Times of the responses after it, equally spaced from 0 (steps,) [s].
         tip: Row of the first node of the tip ring.
         ws: Workspace of the static solve that found ``q_eq``.
-        V: Basis (12 n_modules, modes + m), refined by this call; see :func:`start_basis`.
+        V: Basis (n_free, modes + m), refined by this call; see :func:`start_basis`.
 
     Returns:
         change (steps, 7 + m, m + 1) of position [m], normal, twist [rad] and tensions [N] since the state:
@@ -187,12 +187,12 @@ def respond(
         tangent was positive definite.
     """
     m, r, first = model.cables.shape[0], V.shape[1], 3 * (tip - FIXED)
-    step, steps = ahead[0], ahead.shape[0]
+    h, steps = ahead[0], ahead.shape[0]
     for c in range(m):
         ws.axial[c] = model.cables[c, STIFFNESS]
     linear.couple(ws, ws.r)
     refine_basis(model, ws, V)
-    GV, b = np.empty((m, r)), 1.0 / (GAMMA * step)
+    GV, b = np.empty((m, r)), 1.0 / (GAMMA * h)
     reduced = _project(ws, V, GV)
     a = b * b + model.damping * b
     for i in range(r):
@@ -209,19 +209,19 @@ def respond(
             F[i, c] = -ws.axial[c] * GV[c, i]
     _observe(CV, GV, ws.axial, 0.0, x, start)
     for n in range(steps):
-        t = n * step
-        _stage(reduced, a, b, t + GAMMA * step, x, vx, F, stage1)
+        t = n * h
+        _stage(reduced, a, b, t + GAMMA * h, x, vx, F, stage1)
         for i in range(r):
             for c in range(m + 1):
                 v1 = b * (stage1[i, c] - x[i, c])
-                x[i, c] += (1.0 - GAMMA) * step * v1
-                vx[i, c] += (1.0 - GAMMA) * step * b * (v1 - vx[i, c])
-        _stage(reduced, a, b, t + step, x, vx, F, stage2)
+                x[i, c] += (1.0 - GAMMA) * h * v1
+                vx[i, c] += (1.0 - GAMMA) * h * b * (v1 - vx[i, c])
+        _stage(reduced, a, b, t + h, x, vx, F, stage2)
         for i in range(r):
             for c in range(m + 1):
                 vx[i, c] = b * (stage2[i, c] - x[i, c])
                 x[i, c] = stage2[i, c]
-        _observe(CV, GV, ws.axial, t + step, x, change[n])
+        _observe(CV, GV, ws.axial, t + h, x, change[n])
         change[n] -= start
     return change, True
 
@@ -241,7 +241,7 @@ def _project_state(mass: Array, V: Array, offset: Array, v: Array, x: Array, vx:
 
 
 def start_basis(model: Model, ws: Workspace, modes: int, iterations: int = 30) -> Array:
-    """Basis (12 n_modules, modes + m) at the stable equilibrium that ``ws`` (K, U, G) belongs to.
+    """Basis (n_free, modes + m) at the stable equilibrium that ``ws`` (K, U, G) belongs to.
 
     Starts from a fixed pseudo-random block; 30 orthogonal iterations separate modes a factor 2 apart in
     frequency to 1e-18.

@@ -27,7 +27,7 @@ def envelope(**changes):
         names=("c1", "c2", "c3"),
         low=np.full(M, LOW),
         high=np.full(M, HIGH),
-        step=np.full(M, STEP),
+        change=np.full(M, STEP),
         speed=np.full(M, 50_000.0),
         acceleration=np.full(M, np.inf),
         groups=(AntagonistGroup((0, 1, 2), -15_000, 60_000),),

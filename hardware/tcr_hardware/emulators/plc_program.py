@@ -161,7 +161,7 @@ class PlcProgram:
     def coast(self, dt: float) -> None:
         """Time passes for the drives alone: they follow their last set-points, also while the program hangs."""
         for servo, active, origin in zip(self.servos, self.active, self._origin, strict=True):
-            servo.step(active + origin, dt)
+            servo.advance(active + origin, dt)
 
     def _watch(self, command: PlcCommand, dt: float) -> None:
         """Watchdog: the host has to change HEARTBEAT while operation is enabled."""

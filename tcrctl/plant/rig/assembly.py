@@ -35,7 +35,7 @@ def envelope(mounted: MountedRobot, rules: SafetyRules, names: tuple[str, ...]) 
         names=names,
         low=np.array([round(1e3 * cable.min_mm) for cable in cables]),
         high=np.array([round(1e3 * cable.max_mm) for cable in cables]),
-        step=np.full(len(cables), int(1e3 * rules.max_step_mm)),
+        change=np.full(len(cables), int(1e3 * rules.max_step_mm)),
         speed=np.array([1e3 * cable.speed_limit_mm_s for cable in cables]),
         acceleration=np.full(len(cables), np.inf if acceleration is None else 1e3 * acceleration),
         groups=tuple(

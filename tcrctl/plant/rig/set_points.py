@@ -43,7 +43,7 @@ class DriveEnvelope:
         names: Names of the cables.
         low: Shortest drive lengths [um].
         high: Longest drive lengths [um].
-        step: Most that a set-point may change from one write to the next [um].
+        change: Most that a set-point may change from one write to the next [um].
         speed: Largest speeds [um/s].
         acceleration: Largest change of speed [um/s2]; infinite if it is not limited.
         groups: Cables whose sum is limited.
@@ -52,7 +52,7 @@ class DriveEnvelope:
     names: tuple[str, ...]
     low: Micrometres
     high: Micrometres
-    step: Micrometres
+    change: Micrometres
     speed: Array
     acceleration: Array
     groups: tuple[AntagonistGroup, ...] = ()
@@ -155,7 +155,7 @@ class SetPoints:
 
     def _allowed_positions(self, wanted: Micrometres, clamps: list[Clamp]) -> Micrometres:
         e = self._envelope
-        near = np.clip(wanted, self.accepted - e.step, self.accepted + e.step)
+        near = np.clip(wanted, self.accepted - e.change, self.accepted + e.change)
         self._note(clamps, "step limit", wanted, near, 1e3, "mm")
         # a start outside the stroke may only move inwards, and not faster than the step limit
         inside = np.clip(near, np.minimum(e.low, self.accepted), np.maximum(e.high, self.accepted))

@@ -267,7 +267,7 @@ def test_a_drive_arrives_without_overshoot_within_its_speed_and_acceleration(to,
     servo, before = Servo(limits), 0.0
     duration = abs(to) / speed + 12 * lag + 2 * (abs(to) / acceleration) ** 0.5 + speed / acceleration
     for _ in range(round(duration / DT) + 2):
-        servo.step(to, DT)
+        servo.advance(to, DT)
         assert abs(servo.speed) <= speed * (1 + 1e-12)
         assert abs(servo.speed - before) <= acceleration * DT * (1 + 1e-9) + 1e-9
         assert min(0.0, to) - 1e-3 <= servo.position <= max(0.0, to) + 1e-3
@@ -278,7 +278,7 @@ def test_a_drive_arrives_without_overshoot_within_its_speed_and_acceleration(to,
 def test_a_drive_follows_a_ramp_late_by_its_lag():
     servo, speed = Servo(ServoSettings(lag_s=0.04)), 20_000.0
     for k in range(500):
-        servo.step(speed * k * DT, DT)
+        servo.advance(speed * k * DT, DT)
     assert speed * 499 * DT - servo.position == pytest.approx(speed * (0.04 - DT), rel=0.05)
 
 
@@ -286,9 +286,9 @@ def test_play_keeps_the_cable_still_when_the_drive_turns_round():
     servo = Servo(ServoSettings(backlash_um=200.0))
     for target in (1_000.0, 900.0):
         for _ in range(300):
-            servo.step(target, DT)
+            servo.advance(target, DT)
     assert servo.position == pytest.approx(900.0, abs=1.0)
     assert servo.output == pytest.approx(900.0, abs=1.0)  # 1000 - half the play on the way in
     for _ in range(300):
-        servo.step(700.0, DT)
+        servo.advance(700.0, DT)
     assert servo.output == pytest.approx(800.0, abs=1.0)
