@@ -55,7 +55,7 @@ def samples() -> list[tuple[Version, int, bytes]]:
 
 
 def mutated(payload: bytes, rng: random.Random) -> bytes:
-    """A damaged copy."""
+    """Return a damaged copy."""
     out = bytearray(payload)
     for _ in range(rng.randint(1, 3)):
         at = rng.randrange(len(out)) if out else 0
@@ -86,7 +86,7 @@ def decode(version: Version, message: int, payload: bytes) -> None:
 
 
 def outcome_of(version: Version, message: int, payload: bytes) -> tuple[str, float]:
-    """What became of a payload, and the processor time [s]."""
+    """Decode a payload; return what became of it, and the processor time [s]."""
     start = time.thread_time()
     try:
         decode(version, message, payload)

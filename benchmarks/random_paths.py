@@ -63,7 +63,7 @@ def random_drives(random: np.random.Generator) -> Array:
 
 
 def random_pose(random: np.random.Generator, robot: Robot) -> WaypointSettings:
-    """A pose that the nominal robot takes at rest with all cables taut."""
+    """Draw a pose that the nominal robot takes at rest with all cables taut."""
     while True:
         drive = random_drives(random)
         try:

@@ -234,7 +234,7 @@ def _history(log: Log, label: str, begin: float | None, end: float | None) -> Hi
 
 
 def _shapes(q: NDArray[Any]) -> tuple[NDArray[np.int64], Array]:
-    """Steps with a whole shape, and the shapes; a log need not have one at every step."""
+    """Return steps with a whole shape, and the shapes; a log need not have one at every step."""
     if not q.shape[1] or q.shape[1] % SIZE:
         return np.zeros(0, np.int64), np.zeros((0, 0, 3))
     known = np.flatnonzero(np.isfinite(q).all(axis=1))

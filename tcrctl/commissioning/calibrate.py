@@ -81,7 +81,7 @@ def _measured(client: NatNetClient, nodes: list[NodeMarker], seconds: float) -> 
 
 
 def calibration_text(found: CalibrationResult) -> str:
-    """The section ``calibration`` of a rig file, in one line."""
+    """Write the section ``calibration`` of a rig file, in one line."""
     numbers: dict[str, Any] = found.transform.as_dict()
     rounded = {
         "quaternion_xyzw": [round(x, 9) for x in numbers["quaternion_xyzw"]],

@@ -22,7 +22,7 @@ class Finding:
     exit_code: int = 0
 
     def as_json(self) -> dict[str, Any]:
-        """The finding as an object."""
+        """Return the finding as an object."""
         return {**asdict(self), "ok": self.exit_code == 0}
 
 

@@ -35,7 +35,7 @@ class RigStatus:
     exit_code: int
 
     def as_json(self) -> dict[str, Any]:
-        """The status as an object."""
+        """Return the status as an object."""
         bits: dict[str, Any] = {}
         if self.drives is not None:
             names = (

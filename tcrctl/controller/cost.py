@@ -38,7 +38,7 @@ def make_weights(settings: IocSettings, m: int, instants: int) -> Weights:
 
 
 def make_target(settings: IocSettings, reference: Reference, shift: Array, m: int) -> Array:
-    """Outputs wanted at the prediction instants (n, 7 + m), shifted by the integral action (6,)."""
+    """Return outputs wanted at the prediction instants (n, 7 + m), shifted by the integral action (6,)."""
     n = reference.ahead_position.shape[0]
     target = np.zeros((n, POSE_ROWS + m))
     target[:, :3] = reference.ahead_position + shift[:3]
@@ -69,7 +69,7 @@ def pose_error(reference: Reference, position: Array, normal: Array) -> Array:
 
 
 def outputs(estimate: Estimate, age: float, robot: Robot) -> Array:
-    """Outputs now (7 + m,): end position, normal, twist, tensions, moved on by ``age`` [s] with the velocity."""
+    """Return outputs now (7 + m,): end position, normal, twist, tensions, moved on by ``age`` [s] with v."""
     first = 3 * robot.tip
     moved = age * (pose.output_matrix(estimate.q, robot.tip) @ estimate.v[first : first + 9])
     twist = pose.twist(estimate.q, robot.tip)

@@ -53,7 +53,7 @@ def needed_speeds(gain: Array, output: Array, poses: Array, edges: Array, spacin
 
 @njit(cache=True, error_model="numpy")
 def wanted_changes(previous: Array, needed_before: Array, needed: Array) -> Array:
-    """Changes of speed that cost nothing, block after block (blocks * m,) [m/s]; the first one from standstill.
+    """Return changes of speed that cost nothing, block by block (blocks * m,) [m/s]; the first from standstill.
 
     Args:
         previous: Input of the last step (m,) [m/s].

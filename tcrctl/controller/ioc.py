@@ -157,7 +157,7 @@ def _violated(prediction: Prediction, weights: Weights, U: Array, chosen: Array)
 def _rows(
     program: QuadraticProgram, prediction: Prediction, weights: Weights, chosen: Array
 ) -> tuple[Array, Array, Array]:
-    """A (rows, U), b (rows,), D (rows,): box rows first, then the chosen tension rows."""
+    """Return A (rows, U), b (rows,), D (rows,): box rows first, then the chosen tension rows."""
     size, m = program.g.shape[0], chosen.shape[1] // 2
     total = 2 * size + np.sum(chosen)
     A, b, D = np.zeros((total, size)), np.zeros(total), np.zeros(total)

@@ -34,5 +34,5 @@ def node_mass(mass: float) -> float:
 
 
 def sides(nodes: tuple[int, int, int]) -> list[tuple[int, int]]:
-    """The three virtual rods of (5) as pairs of node numbers."""
+    """Return the three virtual rods of (5) as pairs of node numbers."""
     return [(nodes[0], nodes[1]), (nodes[1], nodes[2]), (nodes[2], nodes[0])]

@@ -166,7 +166,7 @@ class EmulatedBench:
             raise self._failure
 
     def as_json(self) -> dict[str, Any]:
-        """What the bench is doing, for ``tcrctl emulate --json``."""
+        """Say what the bench is doing, for ``tcrctl emulate --json``."""
         return {
             "rig": self._rig.name,
             "cameras": {"frames": self.motive.frames_sent, "clients": self.motive.clients},

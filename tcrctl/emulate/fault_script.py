@@ -83,7 +83,7 @@ def _unknown(fault: Fault) -> Iterator[Finding]:
 
 
 def _wrong_value(name: str, value: Any) -> str:
-    """What is wrong with the value of a camera fault; empty if nothing is."""
+    """Say what is wrong with the value of a camera fault; empty if nothing is."""
     try:
         taken = camera_value(name, value)
     except (TypeError, ValueError) as error:

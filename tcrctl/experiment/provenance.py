@@ -31,7 +31,7 @@ _PACKAGES: Final = (
 
 
 def resolved_text(spec: ExperimentSpec) -> bytes:
-    """An experiment as a file with every default filled in and ``--set`` applied."""
+    """Write an experiment as a file with every default filled in and ``--set`` applied."""
     return strict_yaml.dumps(spec.model_dump(mode="json")).encode()
 
 
@@ -57,7 +57,7 @@ def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str
 
 
 def _drawn(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str, bytes]]:
-    """What a simulated plant is, as far as the experiment only says how it is drawn."""
+    """Return what a simulated plant is, as far as the experiment only says how it is drawn."""
     files: dict[str, tuple[str, bytes]] = {}
     if not isinstance(spec.plant, SimulatedSettings):
         return files

@@ -203,7 +203,7 @@ def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogW
 
 
 def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractContextManager[None]:
-    """A quiet interpreter for runs that the clock paces."""
+    """Keep the interpreter quiet in runs that the clock paces."""
     if not isinstance(pace, RealTime):
         return nullcontext()
     rig = experiment.loaded.rig

@@ -56,7 +56,7 @@ def build_regression(loaded: LoadedIdentification) -> tuple[Regression, str]:
 
 
 def _usual(loaded: LoadedIdentification, recordings: Sequence[Recording]) -> str:
-    """Simulated plants keep their rest lengths whatever their mismatch; else the robot file counts."""
+    """Return what stays: rest lengths with simulated plants, whatever their mismatch; else what the file gives."""
     only_logs = bool(recordings) and not loaded.configurations
     return "length" if only_logs and all(r.rest_length is not None for r in recordings) else "tension"
 
@@ -78,7 +78,7 @@ def _lengths(robot: RobotDescription, recordings: Sequence[Recording]) -> Array:
 
 
 def with_lengths(robot: RobotDescription, rest: Array) -> RobotDescription:
-    """The robot whose cables are given by rest lengths (m,) [m] instead of initial tensions."""
+    """Return the robot whose cables are given by rest lengths (m,) [m] instead of initial tensions."""
     changes: dict[str, float | None] = {TENSION: None}
     for c, length in enumerate(rest):
         changes[f"cables.routes.{c}.rest_length_mm"] = 1e3 * float(length)

@@ -126,7 +126,7 @@ def _tolerance(parameter: Parameter, value: float, tolerance: float) -> float:
 
 
 def _square(tall: Array) -> Array:
-    """A matrix with the columns' inner products of ``tall`` (r, n), but at least and hardly more than n rows."""
+    """Return a matrix with the columns' inner products of ``tall`` (r, n), but only n rows or a few more."""
     r: Array = np.asarray(np.linalg.qr(tall, mode="r"))
     return np.vstack([r, np.zeros((tall.shape[1] - len(r), tall.shape[1]))])
 
@@ -171,7 +171,7 @@ def _resting(
     assumed: str,
     prior: float,
 ) -> list[Combination]:
-    """Combinations, of those that are certain, which are so only because of the assumed value.
+    """Return those certain combinations which are so only because of the assumed value.
 
     The last column of ``wide`` is that of the assumed value; ``prior`` is its tolerance over its spread.
     """

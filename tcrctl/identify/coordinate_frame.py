@@ -35,7 +35,7 @@ class CoordinateFrame:
 
     @classmethod
     def of(cls, settings: FrameSettings) -> CoordinateFrame:
-        """The frame as far as it is known; ``mirrored: try`` begins with no."""
+        """Return the frame as far as it is known; ``mirrored: try`` begins with no."""
         return cls(
             yaw=math.radians(settings.yaw_deg),
             offset=np.array(settings.offset_mm) / 1e3,
@@ -50,7 +50,7 @@ class CoordinateFrame:
         return np.concatenate([[self.yaw] * self.free_yaw, self.offset if self.free_offset else []])
 
     def with_unknowns(self, values: Array) -> CoordinateFrame:
-        """The frame with other values of what is unknown."""
+        """Return the frame with other values of what is unknown."""
         yaw = float(values[0]) if self.free_yaw else self.yaw
         return replace(self, yaw=yaw, offset=values[-3:] if self.free_offset else self.offset)
 
@@ -68,7 +68,7 @@ class CoordinateFrame:
         return self.turned(model) + self.offset
 
     def slopes(self, model: Array) -> Array:
-        """Derivative of :meth:`place` with respect to the unknowns (n, 3, unknowns)."""
+        """Return the derivative of :meth:`place` with respect to the unknowns (n, 3, unknowns)."""
         columns: list[Any] = []
         if self.free_yaw:
             turned = self.turned(model)
@@ -78,7 +78,7 @@ class CoordinateFrame:
         return np.stack(columns, axis=2) if columns else np.zeros((*model.shape, 0))
 
     def aligned(self, model: Array, measured: Array) -> CoordinateFrame:
-        """The frame with the unknowns that fit best, points not measured (NaN) left out.
+        """Return the frame with the unknowns that fit best, points not measured (NaN) left out.
 
         Args:
             model: Positions in the robot's frame (n, 3) [m].

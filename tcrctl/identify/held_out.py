@@ -46,7 +46,7 @@ def held_out_errors(evaluator: Evaluator, residuals: Residuals, answer: Array) -
 
 
 def _refitted(evaluator: Evaluator, residuals: Residuals, answer: Array, rest: NDArray[np.bool_]) -> Array:
-    """The answer from the coordinates ``rest`` (n, 3) alone; NaN if there is none."""
+    """Return the answer from the coordinates ``rest`` (n, 3) alone; NaN if there is none."""
     best = Best.none(*residuals.split(answer))
     try:
         polish(evaluator, rest, best)

@@ -173,7 +173,7 @@ def _judge(work: Work, residuals: Residuals, answer: Array) -> Certainty:
 
 
 def _assumed(work: Work) -> tuple[str, Array] | None:
-    """Derivative with respect to the scale of the forces that are assumed to be known; None without them."""
+    """Return the derivative by the scale of the forces that are assumed to be known; None without them."""
     regression, best = work.regression, work.best
     free = [p.path for p in regression.parameters]
     forces = assumed_forces(regression.robot, free, moving=bool(regression.recordings))

@@ -53,7 +53,7 @@ class Residuals:
         return out
 
     def jacobian(self, z: Array) -> Array:
-        """Derivative of :meth:`value` [mm], (coordinates, unknowns).
+        """Return the derivative of :meth:`value` [mm], (coordinates, unknowns).
 
         Raises:
             NoEquilibriumError: If the robot has no stable shape there.

@@ -96,7 +96,7 @@ class Regression:
         return out
 
     def describe(self, x: Array) -> RobotDescription:
-        """The robot at ``x`` (n_parameters,) of the unit cube."""
+        """Return the robot at ``x`` (n_parameters,) of the unit cube."""
         return with_values(self.robot, values(self.parameters, x))
 
     def predict(self, x: Array) -> Array:
@@ -146,7 +146,7 @@ class Regression:
         return np.array([c.drive for c in self.configurations]).reshape(-1, len(self.robot.cables.routes))
 
     def with_parameters(self, parameters: Sequence[Parameter]) -> Regression:
-        """The same data with other parameters."""
+        """Return the same data with other parameters."""
         return replace(self, parameters=tuple(parameters))
 
     def __getstate__(self) -> dict[str, Any]:
@@ -162,7 +162,7 @@ def distances(frame: CoordinateFrame, predicted: Array, measured: Array) -> Arra
 
 
 def mean_distance(frame: CoordinateFrame, predicted: Array, measured: Array) -> float:
-    """The objective (10) [mm], frame unknowns at their best."""
+    """Return the objective (10) [mm], frame unknowns at their best."""
     seen = ~np.isnan(measured).all(axis=1)
     found = frame.aligned(predicted, measured)
     return float(distances(found, predicted, measured)[seen].mean())

@@ -175,5 +175,5 @@ def _moved(robot: Robot, twins: Sequence[Twins], q: Array, drive: Array, *, keep
 
 
 def _free(q: Array) -> Array:
-    """The part of ``q`` (3 n_nodes,) that belongs to the free nodes."""
+    """Return the part of ``q`` (3 n_nodes,) that belongs to the free nodes."""
     return q[3 * FIXED :]

@@ -71,7 +71,7 @@ OPTIONAL: Final = ("truth", "measurement.raw")
 
 
 def meanings(record: type = StepRecord, prefix: str = "") -> dict[str, str]:
-    """What every column is, by its name: the words of :mod:`tcrctl.signals`; empty where those say nothing."""
+    """Say what every column is, by name: the words of :mod:`tcrctl.signals`; empty where those say nothing."""
     said = dict(_ATTRIBUTE.findall(inspect.cleandoc(record.__doc__ or "")))
     found: dict[str, str] = {}
     for name, kind in get_type_hints(record).items():

@@ -51,7 +51,7 @@ class Difference:
     ulps: int | None
 
     def as_json(self) -> dict[str, Any]:
-        """The object ``first_difference`` of ``replay --json``; numbers that are not finite become text."""
+        """Return the object ``first_difference`` of ``replay --json``; numbers that are not finite become text."""
         values = {"recorded": _plain(self.recorded), "replayed": _plain(self.replayed)}
         return {"step": self.step, "field": self.field, **values, "ulps": self.ulps}
 
@@ -89,7 +89,7 @@ class Deviation:
             self.largest = max(float(np.max(size)), 0.0 if math.isnan(self.largest) else self.largest)
 
     def as_json(self) -> dict[str, Any]:
-        """An item of ``deviations`` in ``replay --json``."""
+        """Return an item of ``deviations`` in ``replay --json``."""
         return {
             "field": self.field,
             "unit": self.unit,
@@ -166,7 +166,7 @@ class Comparison:
         return bool(was == now)
 
     def _close(self, was: Any, now: Any) -> Any:
-        """True where a number is within the tolerance; bits of NaN do not count if there is one."""
+        """Tell where a number is within the tolerance; bits of NaN do not count if there is one."""
         if not self._tolerant or np.asarray(was).dtype != np.float64:
             return _bits(was) == _bits(now)
         return np.isclose(now, was, rtol=self._rtol, atol=self._atol, equal_nan=True)

@@ -57,7 +57,7 @@ def _unit(a: Array) -> Array:
 
 
 def quaternions(rotation: Array) -> Array:
-    """Unit quaternions x, y, z, w (n, 4) of rotation matrices (n, 3, 3).
+    """Return the unit quaternions x, y, z, w (n, 4) of rotation matrices (n, 3, 3).
 
     4 q q' is linear in the matrix; its row with the largest diagonal entry, normalised, is q without
     cancellation.
@@ -79,5 +79,5 @@ def quaternion_of_normal(normal: Array) -> Array:
 
 
 def drawable(*arrays: NDArray[np.floating]) -> bool:
-    """True if every number is finite and below 1e6 m: what is not must neither be drawn nor overflow here."""
+    """Tell if all numbers are finite and below 1e6 m: what is not must neither be drawn nor overflow here."""
     return all(bool((np.abs(array) < 1e6).all()) for array in arrays)

@@ -56,7 +56,7 @@ class Scene:
         self._springs = geometry.springs.ravel()
 
     def encode(self, nodes: Array, tension: Array, when: Timestamp) -> bytes:
-        """Serialised SceneUpdate of what moves.
+        """Serialise the SceneUpdate of what moves.
 
         Args:
             nodes: Node positions (n_nodes, 3) [m].
@@ -75,7 +75,7 @@ class Scene:
         return update.SerializeToString()
 
     def encode_static(self, nodes: Array, with_axis: bool, when: Timestamp) -> bytes:
-        """Serialised SceneUpdate of what never changes in its frame.
+        """Serialise the SceneUpdate of what never changes in its frame.
 
         Args:
             nodes: Node positions of any shape (n_nodes, 3) [m]; only the radii of the rings matter.

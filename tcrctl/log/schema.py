@@ -207,7 +207,7 @@ def wire_class(name: str) -> Any:
 
 
 def descriptor_set(descriptor: Descriptor) -> bytes:
-    """Serialised FileDescriptorSet of a message type and all its imports: an MCAP ``protobuf`` schema."""
+    """Serialise the FileDescriptorSet of a message type and all its imports: an MCAP ``protobuf`` schema."""
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: FileDescriptor) -> None:
@@ -223,7 +223,7 @@ def descriptor_set(descriptor: Descriptor) -> bytes:
 
 
 def units(name: str = "Step", prefix: str = "") -> dict[str, str]:
-    """Unit of every field of message type ``name`` that has one, by dotted path."""
+    """Return the unit of every field of message type ``name`` that has one, by dotted path."""
     found: dict[str, str] = {}
     for field in MESSAGES[name]:
         if field.kind in MESSAGES:

@@ -93,7 +93,7 @@ class StepDecoder:
 
 
 def _rounded(step: StepRecord) -> StepRecord:
-    """The step with single precision where no controller has seen the numbers."""
+    """Return the step with single precision where no controller has seen the numbers."""
     timing, truth = Timing(*(_single(seconds) for seconds in astuple(step.timing))), step.truth
     if truth is not None:
         truth = replace(

@@ -36,7 +36,7 @@ SCENE_RATE_HZ: Final = 5.0
 
 
 def stride(period: float, rate_hz: float) -> int:
-    """Steps between two messages so that no more than ``rate_hz`` of them appear per second."""
+    """Return steps between two messages so that no more than ``rate_hz`` of them appear per second."""
     return max(1, int(np.ceil(1.0 / (rate_hz * period) - 1e-9)))
 
 
@@ -94,7 +94,7 @@ class ViewerTopics:
             yield "/scene", self._scene.encode(nodes, _tension(record), when)
 
     def static(self, record: StepRecord, nodes: Array, when: Timestamp) -> bytes:
-        """Encoded message of what stands still in its frame, for nodes (n_nodes, 3) [m] of the step."""
+        """Encode what stands still in its frame, for nodes (n_nodes, 3) [m] of the step."""
         self._static_written = True
         return self._scene.encode_static(nodes, record.reference.normal is not None, when)
 

@@ -89,7 +89,7 @@ class Report:
         return os.cpu_count() or 1
 
     def as_json(self) -> dict[str, Any]:
-        """The object of ``tcrctl paper --json``."""
+        """Return the object of ``tcrctl paper --json``."""
         status = "aborted" if self.interruption else "failed" if self.missed else "success"
         return {
             "status": status,

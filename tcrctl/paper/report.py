@@ -48,7 +48,7 @@ class Line:
         return (work, row.paper, *bars, self.measured, f"{word}: {self.reason}" if self.reason else word)
 
     def as_json(self) -> dict[str, Any]:
-        """The item of ``rows`` in ``tcrctl paper --json``."""
+        """Return the item of ``rows`` in ``tcrctl paper --json``."""
         row = self.row
         return {
             "name": row.name,

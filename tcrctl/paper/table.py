@@ -44,7 +44,7 @@ X_MAX: Final = worst("x_error_mm.max")
 
 
 def inspection(results: Sequence[Result]) -> str:
-    """What was found in the box, and whether it was touched."""
+    """Return what was found in the box, and whether it was touched."""
     (task,) = (result["task"] for result in results)
     touched = f"collision at {task['collision_s']:.3g} s" if task["collision"] else "no collision"
     return f"{task['detected']} of {len(task['objects'])}, {touched}"

@@ -75,7 +75,7 @@ class SimulatedDrives:
         return np.array([in_counts(servo.position, count) for servo in self._servos]) / UM
 
     def move(self, speed: Array) -> Array:
-        """Let the set-points move at ``speed`` (m,) [m/s] for one internal step; return what is taken in (m,) [m]."""
+        """Let the set-points move at ``speed`` (m,) [m/s] for one internal step; return what that takes in [m]."""
         followed = self.set_point + speed * self._ahead
         self.set_point = self.set_point + speed * self._h
         for servo, target in zip(self._servos, (UM * followed).tolist(), strict=True):

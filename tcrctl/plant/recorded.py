@@ -77,7 +77,7 @@ class Recorded:
         return step.measurement
 
     def truth(self) -> Truth | None:
-        """What a simulated plant knew about itself."""
+        """Return what a simulated plant knew about itself."""
         return self.step.truth
 
     def write(self, command: Command) -> Command:
@@ -104,19 +104,19 @@ class Recorded:
         return estimate.q.copy(), estimate.v.copy()
 
     def position(self, t: Array) -> Array:
-        """Recorded end positions wanted now and at the prediction instants (n, 3) [m]; ``t`` (n,) must be these."""
+        """Return recorded end positions wanted now and at the prediction instants ``t`` (n,) [s], (n, 3) [m]."""
         reference = self.step.reference
         return self._as_asked(t, np.vstack([reference.position, reference.ahead_position]))
 
     def normal(self, t: Array) -> Array | None:
-        """Recorded end normals wanted now and at the prediction instants (n, 3), or None."""
+        """Return recorded end normals wanted now and at the prediction instants (n, 3), or None."""
         reference = self.step.reference
         if reference.normal is None or reference.ahead_normal is None:
             return None
         return self._as_asked(t, np.vstack([reference.normal, reference.ahead_normal]))
 
     def drive(self, t: Array) -> Array | None:
-        """Recorded drive lengths wanted at the first prediction instant (1, m) [m], or None."""
+        """Return recorded drive lengths wanted at the first prediction instant (1, m) [m], or None."""
         drive = self.step.reference.drive
         return None if drive is None else self._as_asked(t, drive[None])
 

@@ -106,7 +106,7 @@ def _routes(
 def _tilt(
     robot: RobotDescription, scatter: ScatterSettings, random: np.random.Generator
 ) -> tuple[float, float]:
-    """Turns of the base about x and y [deg]; its direction is drawn."""
+    """Draw the turns of the base about x and y [deg]."""
     direction = random.uniform(0.0, 2.0 * math.pi)
     x, y = robot.base.tilt_deg
     return x + scatter.tilt_deg * math.cos(direction), y + scatter.tilt_deg * math.sin(direction)

@@ -118,7 +118,7 @@ class SimulatedPlant:
         return applied
 
     def truth(self) -> Truth:
-        """True end pose, tensions and shape now."""
+        """Return the true end pose, tensions and shape now."""
         q = self._body.state.q
         return Truth(
             position=pose.position(q, self.robot.tip),
@@ -128,7 +128,7 @@ class SimulatedPlant:
         )
 
     def state(self) -> tuple[Array, Array]:
-        """True node positions [m] and velocities [m/s] now, (3 n_nodes,) each."""
+        """Return the true node positions [m] and velocities [m/s] now, (3 n_nodes,) each."""
         return self._body.state.q.copy(), self._body.state.v.copy()
 
     def without_noise(self) -> None:

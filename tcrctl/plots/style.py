@@ -164,7 +164,7 @@ def limit(panel: Axes, values: Array, bounds: Sequence[float | None], name: str,
 
 
 def _is_near(bound: float, values: Array) -> bool:
-    """True if drawing the limit too leaves most of the panel to the values."""
+    """Tell if drawing the limit too leaves most of the panel to the values."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     reach = max(0.35 * (high - low), 0.1 * max(abs(low), abs(high)))
     return low - reach <= bound <= high + reach

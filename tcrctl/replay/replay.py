@@ -123,7 +123,7 @@ class _Replay:
         self._done = 0
 
     def _references(self, first: StepRecord | None) -> Trajectory:
-        """Recorded references; those of the trajectory itself if the controller looks at other instants."""
+        """Return recorded references; those of the trajectory itself if the controller looks at other instants."""
         recorded = self._origin.recorded.spec
         if first is None or self._origin.wanted is self._origin.recorded:
             return self._plant
@@ -154,7 +154,7 @@ class _Replay:
         return ""
 
     def _parts(self) -> Parts:
-        """Recorded plant and references, rebuilt estimator and controller; a changed one may fail and go on."""
+        """Build the parts: recorded plant and references, estimator and controller; a changed one may fail."""
         experiment = Experiment(self._origin.wanted, self._origin.wanted.spec, self.robot, self._trajectory)
         limits = experiment.safety if self._origin.wanted is self._origin.recorded else NO_LIMITS
         return Parts(
@@ -189,7 +189,7 @@ class _Replay:
         seconds: float,
         out: Path | None,
     ) -> Replay:
-        """What was found, given why the replay ended."""
+        """Return what was found, given why the replay ended."""
         found = self._comparison
         gap = isinstance(ended, RecordingEndedError) and ended.found is not None
         stopped = ended if isinstance(ended, str) else ""
@@ -246,7 +246,7 @@ def _same_instants(one: Controller, other: Controller) -> bool:
 
 
 def _total(log: Log, window: Window) -> int | None:
-    """Steps to be replayed, if the log says how many it has."""
+    """Return the number of steps to be replayed, if the log says how many it has."""
     written = (log.stop or {}).get("steps", "")
     if not written.isdecimal():
         return None

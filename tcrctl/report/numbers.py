@@ -156,7 +156,7 @@ def _every(count: int, most: int) -> NDArray[np.int64]:
 
 
 def _bundles(count: int) -> tuple[int, int]:
-    """Number of bundles and points in each, so that two per bundle are at most ``MOST_POINTS``."""
+    """Return the number of bundles and points in each, so that two per bundle are at most ``MOST_POINTS``."""
     size = -(-2 * count // MOST_POINTS)
     return count // size, size
 
@@ -181,7 +181,7 @@ def bundled(values: Array) -> Array:
 
 
 def bundled_times(t: Array) -> Array:
-    """Times (k,) of the points that :func:`bundled` keeps, taken in the first and the middle of every bundle."""
+    """Return times (k,) of the points that :func:`bundled` keeps: the first and the middle of every bundle."""
     if len(t) <= MOST_POINTS:
         return t
     count, size = _bundles(len(t))
@@ -190,7 +190,7 @@ def bundled_times(t: Array) -> Array:
 
 
 def bundled_marks(marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Marks (k,) of the points that :func:`bundled` keeps: set where any point of the bundle is marked."""
+    """Return marks (k,) of the points that :func:`bundled` keeps: set where any point of the bundle is marked."""
     if len(marks) <= MOST_POINTS:
         return marks
     count, size = _bundles(len(marks))

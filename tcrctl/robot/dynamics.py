@@ -107,7 +107,7 @@ def unworn(model: Model, q: Array, drive: Array, tension: Array, holes: Array) -
 
 
 def lead_direction(q: Array) -> Array:
-    """Unit vector from the actuators to the base ring (3,): along the base's axis, towards the robot."""
+    """Return the unit vector from the actuators to the base ring (3,): along the base's axis, towards the robot."""
     r = q[:9].reshape(3, 3)
     up = np.cross(r[1] - r[0], r[2] - r[0])
     return np.asarray(-up / np.linalg.norm(up))

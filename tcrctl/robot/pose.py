@@ -32,7 +32,7 @@ def _area_vector(q: Array, ring: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def normal(q: Array, ring: int) -> Array:
-    """Unit normal (3,) of the ring, +z at rest (REFERENCES.md, correction 6)."""
+    """Return the unit normal (3,) of the ring, +z at rest (REFERENCES.md, correction 6)."""
     d = _area_vector(q, ring)
     size = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     n: Array = d / size
@@ -59,7 +59,7 @@ def twist(q: Array, ring: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def output_matrix(q: Array, ring: int) -> Array:
-    """Derivatives (7, 9) of position, normal and twist with respect to the ring's nine coordinates.
+    """Return derivatives (7, 9) of position, normal and twist with respect to the ring's nine coordinates.
 
     Rows 0-2: ∂y/∂q = I/3 per node. Rows 3-5: with d = Σ_k r_k x r_{k+1} (twice the area vector's value for a
     triangle), δn = (I - n n') δd / |d|. Row 6: rotation about the normal, the mean of the nodes' tangential
@@ -95,7 +95,7 @@ def output_matrix(q: Array, ring: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def drive_gain(q: Array, gain: Array, ring: int) -> Array:
-    """Derivatives (7, m) of position, normal and twist of a ring by the drives.
+    """Return derivatives (7, m) of position, normal and twist of a ring by the drives.
 
     Args:
         q: Node positions (3 n_nodes,) [m].

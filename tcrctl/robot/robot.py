@@ -135,7 +135,7 @@ def hole_friction(friction: FrictionSettings, first_hole: NDArray[np.int64]) -> 
 
 
 def retensioned(robot: Robot, factors: Array) -> Robot:
-    """The same robot strung otherwise: every cable has its tension at zero drive times a factor (m,).
+    """Return the same robot strung otherwise: every cable has its tension at zero drive times a factor (m,).
 
     Raises:
         NoEquilibriumError: If that robot has no stable shape at zero drive.
@@ -151,7 +151,7 @@ def retensioned(robot: Robot, factors: Array) -> Robot:
 def mismatched(
     robot: Robot, springs: float = 1.0, cables: float = 1.0, density: float = 1.0, tip_load: float = 0.0
 ) -> Robot:
-    """The same robot of other material: factors on moduli and masses, same rest lengths, own rest shape.
+    """Return the same robot of other material: factors on moduli and masses, same rest lengths, own rest shape.
 
     Args:
         robot: The robot as described.

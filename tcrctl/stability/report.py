@@ -111,7 +111,7 @@ class StabilityReport:
         }
 
     def as_json(self) -> dict[str, Any]:
-        """The object of ``tcrctl stability --json``; numbers that are not finite become null."""
+        """Return the object of ``tcrctl stability --json``; numbers that are not finite become null."""
         columns, worst = self.columns(), self.worst
         points = [
             dict(zip(columns, map(_number, row), strict=True)) for row in zip(*columns.values(), strict=True)

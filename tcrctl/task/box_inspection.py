@@ -85,7 +85,7 @@ class BoxInspection:
         return any(hides(eye, self._centres[i], self._centres[j], self._radii[j]) for j in others)
 
     def result(self) -> dict[str, Any]:
-        """What was seen before any collision, and the first collision."""
+        """Return what was seen before any collision, and the first collision."""
         complete = len(self._seen) == len(self._names)
         return {
             "objects": [

@@ -29,7 +29,7 @@ class Task(Protocol):
         ...
 
     def result(self) -> dict[str, Any]:
-        """The object ``task`` of ``run --json``, for the steps so far."""
+        """Return the object ``task`` of ``run --json``, for the steps so far."""
         ...
 
 

@@ -113,7 +113,7 @@ def crc(data: bytes) -> bytes:
 
 
 def _terminals() -> tuple[Callable[[int], Any], type[Exception]]:
-    """What makes a terminal raw, and the error it raises; looked for only here, because Windows has neither.
+    """Return what makes a terminal raw, and the error it raises; imported only here, as Windows has neither.
 
     Raises:
         HardwareError: This system has no terminals of this kind.
@@ -137,7 +137,7 @@ def _pseudo_terminal() -> tuple[int, int]:
 
 
 def _open(device: str) -> int:
-    """A raw serial device.
+    """Open a raw serial device.
 
     Raises:
         HardwareError: It cannot be opened.

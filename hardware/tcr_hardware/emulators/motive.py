@@ -157,7 +157,7 @@ class MotiveEmulator:
                 self.link.send(reply, client)
 
     def latest(self, version: Version) -> bytes:
-        """The markers now, as one FRAMEOFDATA packet."""
+        """Return the markers now, as one FRAMEOFDATA packet."""
         stamp, view = self._look(time.monotonic())
         return encoder.packet(FRAMEOFDATA, encoder.frame(version, stamp, self.tracked, view))
 

@@ -46,7 +46,7 @@ def packet(message: int, payload: bytes = b"") -> bytes:
 
 
 def text(value: str) -> bytes:
-    """A name with its closing zero."""
+    """Encode a name with its closing zero."""
     return value.encode() + b"\0"
 
 

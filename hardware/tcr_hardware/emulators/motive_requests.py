@@ -41,7 +41,7 @@ class Server(Protocol):
         ...
 
     def latest(self, version: Version) -> bytes:
-        """The markers now, as one FRAMEOFDATA packet."""
+        """Return the markers now, as one FRAMEOFDATA packet."""
         ...
 
 

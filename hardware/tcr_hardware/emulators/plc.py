@@ -189,7 +189,7 @@ class PlcEmulator:
             }
 
     def read(self, address: int, count: int) -> list[int]:
-        """Registers (count,) as a client reads them now."""
+        """Read registers (count,) as a client would now."""
         with self._lock:
             self._advance()
             return self._image.read(address, count)

@@ -44,7 +44,7 @@ class PlcImage:
         self._command = [0] * len(self._command)
 
     def read(self, address: int, count: int) -> list[int]:
-        """Registers (count,) from ``address`` on; gaps within a block read 0.
+        """Read registers (count,) from ``address`` on; gaps within a block read 0.
 
         Raises:
             IllegalAddressError: A register lies in no block.
@@ -75,7 +75,7 @@ class PlcImage:
         return {row.name: self._decode(row) for row in self._map.block("command")}
 
     def _block(self, block: str) -> dict[int, int]:
-        """Registers of a block by address."""
+        """Return registers of a block by address."""
         if block == "command":
             return dict(enumerate(self._command, start=self._first))
         values = self._with_faults(self._values(block))
@@ -125,5 +125,5 @@ class PlcImage:
 
 
 def identity() -> dict[str, tuple[float, ...]]:
-    """Registers by which a client knows this map."""
+    """Return registers by which a client knows this map."""
     return {"MAGIC": (MAGIC,), "MAP_VERSION": (MAP_VERSION,), "ORDER_PROBE": (ORDER_PROBE,)}

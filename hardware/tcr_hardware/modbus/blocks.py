@@ -47,7 +47,7 @@ class Blocks:
     def command(
         self, counters: Counters, setpoints_um: Sequence[int], control: Control, vmax_um_s: int
     ) -> list[int]:
-        """Registers of a command block.
+        """Return registers of a command block.
 
         Raises:
             SetpointError: A value does not fit into its register.
@@ -156,7 +156,7 @@ def identify(rows: RegisterMap, words: Sequence[int], word_order: str, byte_orde
 
 
 def _registers(rows: RegisterMap, row: Register, words: Sequence[int]) -> Sequence[int]:
-    """Registers of one quantity within those of its block."""
+    """Return registers of one quantity within those of its block."""
     first = rows.span(row.block)[0]
     return words[row.address - first : row.end - first]
 

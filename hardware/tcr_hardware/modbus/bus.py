@@ -237,7 +237,7 @@ class PlcBus:
         return self._blocks.status(words, self._counters, time.monotonic(), began, attempt)
 
     def _judged(self, status: PlcStatus, *, wrote: bool) -> PlcStatus:
-        """An answer, if it can be true."""
+        """Return an answer if it can be true."""
         limits = self.info.limits
         strokes = zip(limits.min_um, limits.max_um, strict=True)
         for axis, (at, (lowest, highest)) in enumerate(zip(status.positions_um, strokes, strict=True), 1):

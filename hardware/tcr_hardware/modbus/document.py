@@ -90,7 +90,7 @@ since tension zero; positive pulls.
 
 
 def register_map_markdown(rows: RegisterMap) -> str:
-    """The document of a register map."""
+    """Write the document of a register map."""
     parts = [RULES.format(version=MAP_VERSION, axes=rows.axes)]
     for block, title in BLOCKS.items():
         first, count = rows.span(block)
@@ -127,7 +127,7 @@ def _value(item: tuple[IntEnum, str]) -> tuple[str, ...]:
 
 
 def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """A Markdown table."""
+    """Write a Markdown table."""
     lines = [head, ("---",) * len(head), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 

@@ -190,7 +190,7 @@ class ModbusLink:
                 return
 
     def _registers(self, answer: ModbusPDU, count: int) -> list[int]:
-        """Registers of an answer, if it has as many as were asked for."""
+        """Return the registers of an answer if it has as many as were asked for."""
         if len(answer.registers) != count:
             self._unsure = True
             raise StaleAnswerError("number of registers", count, len(answer.registers))
@@ -253,7 +253,7 @@ def _client(link: TcpLink | RtuLink, timeout_s: float) -> ModbusTcpClient | Modb
 
 
 def _why_no_device(device: str) -> str:
-    """What keeps a serial device from being opened."""
+    """Say what keeps a serial device from being opened."""
     if not os.path.exists(device):
         return "There is no such device."
     if not os.access(device, os.R_OK | os.W_OK):

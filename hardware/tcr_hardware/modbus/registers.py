@@ -132,7 +132,7 @@ class RegisterMap:
         return self._by_name[name]
 
     def block(self, name: str) -> tuple[Register, ...]:
-        """Registers of one block."""
+        """Return registers of one block."""
         return tuple(register for register in self.registers if register.block == name)
 
     def span(self, name: str) -> tuple[int, int]:
@@ -217,7 +217,7 @@ def _default_rows(axes: int) -> dict[str, Register]:
 
 
 def _wrong(name: str, change: Mapping[str, object]) -> list[str]:
-    """What is wrong with a change as such."""
+    """Say what is wrong with a change as such."""
     problems = [
         f"{name}.{key}: unknown; allowed: address, kind, scale"
         for key in change
@@ -234,7 +234,7 @@ def _wrong(name: str, change: Mapping[str, object]) -> list[str]:
 
 
 def _unusable(rows: tuple[Register, ...]) -> list[str]:
-    """What keeps a map from being usable."""
+    """Say what keeps a map from being usable."""
     ordered = sorted(rows, key=lambda row: row.address)
     problems = [
         f"{lower.name} ({lower.address} .. {lower.end - 1}) overlaps {upper.name} (from {upper.address})"

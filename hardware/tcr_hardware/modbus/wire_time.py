@@ -86,7 +86,7 @@ def share_of_period(settings: BusSettings, watchdog_ms: int, period_s: float) ->
 
 
 def _check_watchdog(settings: BusSettings, watchdog_s: float, period_s: float) -> None:
-    """The watchdog has to outlast a few cycles, and a silent PLC has to be noticed before it trips."""
+    """Check that the watchdog outlasts a few cycles, and that a silent PLC is noticed before it trips."""
     if WATCHDOG_PERIODS * period_s > watchdog_s:
         raise RateError(
             f"period {1e3 * period_s:g} ms: the watchdog of the PLC ({1e3 * watchdog_s:g} ms) has to be "

@@ -30,7 +30,7 @@ class WordCodec:
     byte_order: str = "big"
 
     def encode(self, register: Register, values: Sequence[float]) -> list[int]:
-        """Registers (words,) that hold the values (count,), given in the unit of the register.
+        """Return registers (words,) that hold the values (count,), given in the unit of the register.
 
         Raises:
             SetpointError: A value is no finite number or does not fit.
@@ -71,7 +71,7 @@ class WordCodec:
 
 
 def _raw(register: Register, value: object) -> float:
-    """Counts of a value."""
+    """Return the counts of a value."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise SetpointError(register.name, value, "finite numbers")
     counts = float(value) / register.scale

@@ -119,7 +119,7 @@ def _asset(reader: Reader, version: Version, found: _Found) -> None:
 
 
 def _identity(asset: int, member: int) -> int:
-    """Number of a marker in a frame: asset in the upper half, member (from 1) in the lower."""
+    """Return a marker's number in a frame: asset in the upper half, member (from 1) in the lower."""
     return (asset << 16) | (member & 0xFFFF)
 
 

@@ -142,7 +142,7 @@ class Session:
         return None
 
     def _server_info(self, info: ServerInfo) -> None:
-        """The server introduced itself: for the first time, again, or as another one."""
+        """Note that the server introduced itself: for the first time, again, or as another one."""
         same, self.server = info == self.server, info
         if same and (self.choice.pending or self.choice.stream is not None):
             return
@@ -172,7 +172,7 @@ class Session:
         return self._on_our_clock(data, now)
 
     def _notice_models(self, new_session: bool, flagged: bool) -> None:
-        """The flag may stay for many frames: its beginning counts, and its end, for what changed in between."""
+        """Note a flag that may stay for many frames: its beginning counts, and its end, for changes in between."""
         if new_session or (flagged and not self._models_changing):
             self._forget_models()
         elif self._models_changing and not flagged:

@@ -17,7 +17,7 @@ def cable_names(description: RobotDescription) -> tuple[str, ...]:
 
 
 def flat(value: dict[str, Any], prefix: str = "") -> dict[str, str]:
-    """A result as one text per number, by its path; what is not known is left out."""
+    """Write a result as one text per number, by its path; what is not known is left out."""
     rows: dict[str, str] = {}
     for key, item in value.items():
         if isinstance(item, dict):

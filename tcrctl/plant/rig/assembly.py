@@ -124,7 +124,7 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operati
 
 
 def _check_period(rules: SafetyRules, period: float) -> None:
-    """A tick must come often enough to notice in time that the cameras have stopped."""
+    """Check that ticks come often enough to notice in time that the cameras have stopped."""
     if 1e3 * period > rules.stale_stop_ms:
         raise InputError(
             f"controller.period_s {period:g} s is longer than safety.stale_stop_ms of the rig, "

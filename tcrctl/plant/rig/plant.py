@@ -96,7 +96,7 @@ class RigPlant:
     # --- the loop ---
 
     def read(self) -> Measurement:
-        """The next camera frame, and where the drives are.
+        """Return the next camera frame, and where the drives are.
 
         If no frame comes in time, it is the last one again, with the time at which it was taken.
 
@@ -139,7 +139,7 @@ class RigPlant:
         return Command(np.asarray(change, float), np.asarray(1e-6 * points.accepted, float))
 
     def truth(self) -> Truth | None:
-        """A rig does not know more than it measures."""
+        """Return None: a rig does not know more than it measures."""
         return None
 
     # --- before and after it ---
@@ -248,7 +248,7 @@ class RigPlant:
         self._refused = self._refused + 1 if refused else 0
 
     def _frame(self) -> Sighting | None:
-        """The next frame if the cameras are much faster than the loop, else the newest."""
+        """Return the next frame if the cameras are much faster than the loop, else the newest."""
         interval = 1.0 / self._cameras.rate
         return self._cameras.next(PATIENCE * interval, fresh=interval <= 0.5 * self._period)
 
@@ -266,7 +266,7 @@ class RigPlant:
         return Measurement(taken, sighting.nodes, sighting.valid, drive, sighting.raw)
 
     def _last_seen(self, epoch: float, drive: Array) -> Measurement:
-        """What is known if no frame came; ``epoch`` is the time of the run at time 0 of the clock."""
+        """Return what is known if no frame came; ``epoch`` is the time of the run at time 0 of the clock."""
         seen = self._seen
         if seen is None:
             nobody = np.zeros(self._limits.nodes, np.bool_)

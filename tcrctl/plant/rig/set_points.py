@@ -130,16 +130,16 @@ class SetPoints:
         return whole, tuple(clamps)
 
     def accept(self) -> None:
-        """The drives have got what was proposed last."""
+        """Note that the drives have got what was proposed last."""
         self._before = self.accepted
         self.accepted, self._exact, self._speed = self._next, self._next_exact, self._next_speed
 
     def start_again(self) -> None:
-        """The drives have not got it: the next proposal starts at what they got before, from standstill."""
+        """Note that they have not got it: the next proposal starts at what they got before, from standstill."""
         self._exact, self._speed = self.accepted.astype(float), np.zeros_like(self._speed)
 
     def take_back(self) -> None:
-        """The drives have refused what they got last: the one before is still in force."""
+        """Note that they have refused what they got last: the one before is still in force."""
         self.accepted = self._before
         self.start_again()
 

@@ -123,7 +123,7 @@ class Supervisor:
             raise ArmingRefusedError(reasons, hint=RESET_HINT if latched else "")
 
     def arm(self, cause: str) -> None:
-        """The drives are on and echo what they are sent."""
+        """Note that the drives are on and echo what they are sent."""
         self._go(SafetyState.ARMED, "info", cause)
 
     def begin_zeroing(self) -> None:
@@ -135,7 +135,7 @@ class Supervisor:
         self._go(SafetyState.DISARMED, "info", cause)
 
     def run(self) -> None:
-        """The first command of the controller is about to be sent."""
+        """Note that the first command of the controller is about to be sent."""
         if self.state is SafetyState.ARMED:
             self._go(SafetyState.RUNNING, "info", "first command")
 
@@ -190,7 +190,7 @@ class Supervisor:
         return self.state
 
     def reset(self) -> None:
-        """An operator has removed the cause of a fault."""
+        """Note that an operator has removed the cause of a fault."""
         if self.state is SafetyState.FAULTED:
             self.failure = None
             self._go(SafetyState.DISARMED, "info", "reset by the operator")
@@ -228,7 +228,7 @@ class Supervisor:
 
 
 def _fault(status: DriveStatus | None, *, enabled: bool = True) -> str:
-    """What the drives report that ends a run at once and is latched; empty if all is well."""
+    """Say what of the drives' report ends a run at once and is latched; empty if all is well."""
     if status is None:
         return ""
     if status.estop:
