@@ -3,7 +3,7 @@
     set-point -> dead time -> counts -> position loop with lag and limits -> encoder -> play -> winch -> cable
 
 The emulated PLC and the simulated plant move their cables by it. Nothing in it knows where it is used.
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 

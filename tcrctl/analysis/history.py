@@ -24,9 +24,17 @@ from tcrctl.robot.module import SIZE
 from tcrctl.signals import Array
 
 _COLUMNS: Final = (
-    "t", "period", "reference_position", "reference_normal", "measurement_drive", "applied_speed",
-    "info_saturated", "timing_estimate", "timing_control", "timing_lateness",
-)  # fmt: skip
+    "t",
+    "period",
+    "reference_position",
+    "reference_normal",
+    "measurement_drive",
+    "applied_speed",
+    "info_saturated",
+    "timing_estimate",
+    "timing_control",
+    "timing_lateness",
+)
 #: What a simulated plant knows exactly and an estimator finds; the truth is shown where there is one.
 _STATE: Final = ("position", "normal", "tension", "q")
 

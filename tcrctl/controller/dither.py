@@ -10,7 +10,7 @@ mean only 2/π asin(U / V) of its friction, with mean speed U and dither speed V
 The measure is the innovation: the measured end position against the one predicted a period before, averaged over a
 whole wave so that the dither's own trace is not in it. A robot without friction does what is predicted, whatever
 else is wrong with its model, so its drives are left in peace. [ADC94]
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 

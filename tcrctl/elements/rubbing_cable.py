@@ -11,7 +11,7 @@ dissipation F_i |s_i| never negative. Its dual is a separable quadratic in the t
 |T_i - T_(i+1)| <= F_i, T >= 0, solved exactly by one pass along the chain (dynamic programming on piecewise linear
 derivatives): holes whose bound is not active *stick*, s_i = 0 to the last bit. Stretches between sticking holes
 form groups whose tensions move together, in series: 1 / k = Σ 1 / k_i. Source of the capstan law: [SC26].
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 

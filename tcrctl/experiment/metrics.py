@@ -11,9 +11,21 @@ from tcrctl.signals import Array, StepRecord
 
 #: Columns of the table that has one row per step.
 _COLUMNS = (
-    "error_x", "error_y", "error_z", "angle", "theta_x", "theta_y", "tension_min", "tension_max",
-    "saturated", "control", "latency", "overrun", "iterations", "unsolved",
-)  # fmt: skip
+    "error_x",
+    "error_y",
+    "error_z",
+    "angle",
+    "theta_x",
+    "theta_y",
+    "tension_min",
+    "tension_max",
+    "saturated",
+    "control",
+    "latency",
+    "overrun",
+    "iterations",
+    "unsolved",
+)
 
 
 class Metrics:

@@ -45,7 +45,7 @@ PlantBuilder = Callable[[Any, "Experiment", Operation], tuple[RunnablePlant, Tru
 
 
 def silent(text: str) -> None:
-    """Take a message for the user and drop it."""
+    """Discard a message for the user."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,8 +26,16 @@ from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.robot.module import ring_rows
 
 _PACKAGES: Final = (
-    "foxglove-schemas-protobuf", "llvmlite", "mcap", "numba", "numpy", "protobuf", "pydantic", "pyyaml", "scipy",
-)  # fmt: skip
+    "foxglove-schemas-protobuf",
+    "llvmlite",
+    "mcap",
+    "numba",
+    "numpy",
+    "protobuf",
+    "pydantic",
+    "pyyaml",
+    "scipy",
+)
 
 
 def resolved_text(spec: ExperimentSpec) -> bytes:

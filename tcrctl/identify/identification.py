@@ -36,7 +36,7 @@ Progress = Callable[[str, int, float], None]
 
 
 def silent(text: str) -> None:
-    """Take a message for the user and drop it."""
+    """Discard a message for the user."""
 
 
 def no_progress(what: str, evaluations: int, best_mm: float) -> None:

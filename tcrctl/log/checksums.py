@@ -13,10 +13,17 @@ from tcrctl.signals import Checksums, StepRecord
 
 # Part of the file format: another list or order makes every log look changed.
 _GIVEN: Final = attrgetter(
-    "measurement.t", "measurement.nodes", "measurement.valid", "measurement.drive",
-    "reference.t", "reference.position", "reference.normal", "reference.ahead_position",
-    "reference.ahead_normal", "reference.drive",
-)  # fmt: skip
+    "measurement.t",
+    "measurement.nodes",
+    "measurement.valid",
+    "measurement.drive",
+    "reference.t",
+    "reference.position",
+    "reference.normal",
+    "reference.ahead_position",
+    "reference.ahead_normal",
+    "reference.drive",
+)
 _STATE: Final = attrgetter(
     "estimate.q", "estimate.v", "estimate.disturbance", "info.predicted_tension", "info.integral"
 )

@@ -16,8 +16,13 @@ from tcrctl.signals import StepRecord
 
 #: What a lean step leaves out; its checksum is compared instead.
 _SPARSE: Final = (
-    "estimate.q", "estimate.v", "estimate.disturbance", "info.predicted_tension", "info.integral", "truth.q"
-)  # fmt: skip
+    "estimate.q",
+    "estimate.v",
+    "estimate.disturbance",
+    "info.predicted_tension",
+    "info.integral",
+    "truth.q",
+)
 
 
 def quantities(*left_out: str) -> dict[str, Column]:

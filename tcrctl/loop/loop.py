@@ -1,4 +1,4 @@
-"""The control loop: simulated, recorded or real, it sees protocols only.
+"""The control loop: simulated, recorded or real, it sees protocols only. One control step:
 
     reference ------------------------+
                                       v
@@ -6,7 +6,9 @@
         ^             ^                                    |
         |             +------------- applied --------------+
         +------------------------- robot <-----------------+
-"""  # fmt: skip
+
+The robot is that of the plant: equations, a bench, or a record.
+"""
 
 from __future__ import annotations
 

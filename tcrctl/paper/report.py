@@ -14,9 +14,13 @@ from tcrctl.paper.row import Row, Verdict
 TITLES: Final = ("work", "paper", "must reach", "going to", "measured", "verdict")
 BAD: Final[tuple[Verdict, ...]] = ("missed", "failed")
 _WORDS: Final[Mapping[Verdict, str]] = {
-    "goal": "goal met", "met": "met", "missed": "MISSED", "shown": "-", "failed": "FAILED",
+    "goal": "goal met",
+    "met": "met",
+    "missed": "MISSED",
+    "shown": "-",
+    "failed": "FAILED",
     "not run": "not run",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True)

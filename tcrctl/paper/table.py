@@ -22,9 +22,14 @@ LASER: Final = Run("laser_pipe", alone=True)
 SCAN: Final = Run("box_scan", alone=True)
 FAST_SCAN: Final = Run(
     "box_scan",
-    ("trajectory.approach_s=14", "trajectory.insert_s=4", "trajectory.tilt_s=6", "trajectory.turn_s=26",
-     "trajectory.return_s=6"),
-)  # fmt: skip
+    (
+        "trajectory.approach_s=14",
+        "trajectory.insert_s=4",
+        "trajectory.tilt_s=6",
+        "trajectory.turn_s=26",
+        "trajectory.return_s=6",
+    ),
+)
 POLYLINE: Final = Run("box_polyline")
 DYNAMIC: Final = {total_s: Run(f"dynamic_{total_s}s", alone=True) for total_s in (10, 45, 90)}
 STATIC: Final = {

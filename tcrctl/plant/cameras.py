@@ -3,7 +3,7 @@
     shapes of the robot -> exposure -> markers beside their nodes -> frame that is off -> noise, outliers -> losses
 
 A frame that is lost is the last one again, with the time at which that was taken, as a bench reports it.
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 

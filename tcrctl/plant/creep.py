@@ -6,7 +6,7 @@ Beside its elastic elongation T / k a cable has one more per branch, u_i, which 
 
 In rest it has already come, so that the robot starts where its rest lengths say; only changes count. It is a change
 of unstretched lengths between internal steps, exact for a tension that is constant during the step. Source: [FL75].
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,9 @@
 """A control period of a plant with real drives, cables, springs and cameras, one internal step after the other.
 
+One internal step:
+
     set-points -> drives -> cable taken in -> robot, whose springs give way and whose cables creep -> cameras
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 

@@ -117,9 +117,16 @@ def make_scratch(model: Model) -> Scratch:
     """Allocate the arrays for ``model``."""
     size, bars, m = SIZE * (model.mass.shape[0] + 1), model.bars.shape[0], model.cables.shape[0]
     return Scratch(
-        np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(m), np.zeros((4, size)),
-        np.zeros(bars), np.zeros(bars), np.zeros(m), np.array([0.0, 0.0, -1.0]),
-    )  # fmt: skip
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(m),
+        np.zeros((4, size)),
+        np.zeros(bars),
+        np.zeros(bars),
+        np.zeros(m),
+        np.array([0.0, 0.0, -1.0]),
+    )
 
 
 @njit(cache=True, error_model="numpy")

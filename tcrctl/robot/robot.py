@@ -80,9 +80,14 @@ def _strung(d: RobotDescription, start: Array) -> tuple[Model, Array, Equilibriu
     no_tension = build_model(d, np.ones(len(routes)))
     length, gradient = np.zeros(len(routes)), np.zeros((len(routes), start.shape[0]))
     sliding_cable.path_gradients(
-        start, no_tension.first_hole, no_tension.hole_nodes, no_tension.hole_weights, no_tension.cables,
-        length, gradient,
-    )  # fmt: skip
+        start,
+        no_tension.first_hole,
+        no_tension.hole_nodes,
+        no_tension.hole_weights,
+        no_tension.cables,
+        length,
+        gradient,
+    )
     model = build_model(d, length)
     weight = gravity_force(model, np.array(d.gravity_m_s2, dtype=float))
     given = np.array([np.nan if r.rest_length is None else r.rest_length for r in routes])

@@ -47,9 +47,12 @@ def test_a_mistake_is_found_before_anything_starts(name, tmp_path):
 
 STRANGERS = {
     "robot": ("{at_s: 1, plc: estop, robot: tcr999}", ":2:27: faults.0.robot: there is no robot tcr999"),
-    "marker": ("{at_s: 1, cameras: {nan: [a.1, b.7]}}", ":2:25: faults.0.cameras.nan: there is no marker b.7"),
+    "marker": (
+        "{at_s: 1, cameras: {nan: [a.1, b.7]}}",
+        ":2:25: faults.0.cameras.nan: there is no marker b.7",
+    ),
     "pair": ("{at_s: 1, cameras: {swap: [[a.1, c.3]]}}", "there is no marker c.3"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", STRANGERS)

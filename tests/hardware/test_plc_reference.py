@@ -97,8 +97,12 @@ def test_the_structured_text_fills_the_registers_that_a_bus_reads(armed):
     assert (registers[122], registers[123]) == (0x0102, 0x0304)
     limits = PlcLimitSettings()
     assert registers[200] == limits.watchdog_ms
-    for name, value in (("MIN", limits.min_um), ("MAX", limits.max_um), ("VMAX_LIMIT", limits.vmax_um_s),
-                        ("STEPMAX", limits.step_max_um)):  # fmt: skip
+    for name, value in (
+        ("MIN", limits.min_um),
+        ("MAX", limits.max_um),
+        ("VMAX_LIMIT", limits.vmax_um_s),
+        ("STEPMAX", limits.step_max_um),
+    ):
         row = MAP[name]
         for at in range(row.address, row.end, 2):
             assert (registers[at] << 16 | registers[at + 1]) == value & 0xFFFFFFFF
@@ -209,12 +213,27 @@ def test_both_plcs_forget_the_silence_before_they_were_enabled(armed):
 
 positions = st.integers(-62_000, 62_000)
 events = st.tuples(
-    st.sampled_from(["creep", "creep", "creep", "send", "hold", "stop", "silence", "estop", "drive", "jam", "reset",
-                     "arm", "zero"]),
+    st.sampled_from(
+        [
+            "creep",
+            "creep",
+            "creep",
+            "send",
+            "hold",
+            "stop",
+            "silence",
+            "estop",
+            "drive",
+            "jam",
+            "reset",
+            "arm",
+            "zero",
+        ]
+    ),
     st.lists(positions, min_size=6, max_size=6),
     st.sampled_from([0, 5_000, 50_000, 90_000, 200_000]),
     st.integers(1, 30),
-)  # fmt: skip
+)
 
 
 def act(both, what, wanted, vmax, scans):

@@ -236,11 +236,20 @@ def test_the_command_names_the_file_and_never_replaces_one_unasked(tmp_path, cap
 
 def chromium(page, *options, hash_=""):
     command = [
-        BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
-        "--no-first-run", "--disable-dev-shm-usage", f"--user-data-dir={page.parent / 'chromium'}",
-        "--virtual-time-budget=3000", "--enable-logging=stderr", "--window-size=1300,1500", *options,
+        BROWSER,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-background-networking",
+        "--no-first-run",
+        "--disable-dev-shm-usage",
+        f"--user-data-dir={page.parent / 'chromium'}",
+        "--virtual-time-budget=3000",
+        "--enable-logging=stderr",
+        "--window-size=1300,1500",
+        *options,
         f"file://{page}{hash_}",
-    ]  # fmt: skip
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     assert "CONSOLE" not in done.stderr, done.stderr
     return done.stdout

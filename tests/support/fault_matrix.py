@@ -77,16 +77,29 @@ def harmless(name, *, cameras=None, plc=None):
 
 def blinding(name, **faults):
     return Case(
-        name, faults, connect="disarmed", armed="disarmed", moving="disarmed", stopping="disarmed",
-        says="usable measurement", rule="stale",
-    )  # fmt: skip
+        name,
+        faults,
+        connect="disarmed",
+        armed="disarmed",
+        moving="disarmed",
+        stopping="disarmed",
+        says="usable measurement",
+        rule="stale",
+    )
 
 
 def plc_lost(name, fault, says, **arguments):
     return Case(
-        name, plc=(fault, arguments), connect="disarmed", armed="faulted", moving="faulted", stopping="faulted",
-        says=says, rule="silence", exit_code=5,
-    )  # fmt: skip
+        name,
+        plc=(fault, arguments),
+        connect="disarmed",
+        armed="faulted",
+        moving="faulted",
+        stopping="faulted",
+        says=says,
+        rule="silence",
+        exit_code=5,
+    )
 
 
 NAMES = [f"m{ring}.n{node}" for ring in range(1, 6) for node in (1, 2, 3)]
@@ -211,17 +224,36 @@ class WatchedEmulators:
 
     def loaded(self):
         cables = {f"c{i}": {"axis": i, "min_mm": -20, "max_mm": self.high_mm} for i in range(1, 5)}
-        rig = RigFile.model_validate_json(json.dumps({
-            "name": "matrix",
-            "cameras": {"kind": "natnet", "transport": "unicast", "command_port": self.motive.address[1]},
-            "robots": {"tcr5x4": {
-                "plc": {"kind": "modbus_tcp", "host": self.plc.address[0], "port": self.plc.address[1]},
-                "cables": cables,
-                "markers": {"labels": "m{ring}.n{node}"},
-            }},
-            "safety": {"max_step_mm": MAX_STEP_UM / 1e3, "following_mm": 2.0, "standstill_s": 0.4,
-                       "arm_timeout_s": 0.5, **self.rules},
-        }))  # fmt: skip
+        rig = RigFile.model_validate_json(
+            json.dumps(
+                {
+                    "name": "matrix",
+                    "cameras": {
+                        "kind": "natnet",
+                        "transport": "unicast",
+                        "command_port": self.motive.address[1],
+                    },
+                    "robots": {
+                        "tcr5x4": {
+                            "plc": {
+                                "kind": "modbus_tcp",
+                                "host": self.plc.address[0],
+                                "port": self.plc.address[1],
+                            },
+                            "cables": cables,
+                            "markers": {"labels": "m{ring}.n{node}"},
+                        }
+                    },
+                    "safety": {
+                        "max_step_mm": MAX_STEP_UM / 1e3,
+                        "following_mm": 2.0,
+                        "standstill_s": 0.4,
+                        "arm_timeout_s": 0.5,
+                        **self.rules,
+                    },
+                }
+            )
+        )
         return LoadedRig(rig, "tcr5x4", None, b"")
 
     def plant(self) -> RigPlant:
@@ -285,9 +317,13 @@ def play(case: Case, phase: str, robot: Any, rules: dict[str, Any], watchdog_ms:
             error, state = _closed(plant, error, "" if phase == "stopping" else state)
         moved = _moves(emulators.plc)
         return Outcome(
-            state, error, decided - begun, [text for kind, _, text in emulators.events if kind == "supervisor"],
-            np.array(emulators.sent).reshape(-1, 6), moved,
-        )  # fmt: skip
+            state,
+            error,
+            decided - begun,
+            [text for kind, _, text in emulators.events if kind == "supervisor"],
+            np.array(emulators.sent).reshape(-1, 6),
+            moved,
+        )
 
 
 def _closed(plant, error, state):

@@ -283,10 +283,16 @@ def test_a_viewer_that_stops_reading_holds_nothing_up():
         socket.create_connection(("127.0.0.1", int(live.url.split(":")[-1]))) as s,
     ):
         handshake = (
-            "GET / HTTP/1.1", "Host: x", "Upgrade: websocket", "Connection: Upgrade",
-            "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
-            "Sec-WebSocket-Protocol: foxglove.sdk.v1", "", "",
-        )  # fmt: skip
+            "GET / HTTP/1.1",
+            "Host: x",
+            "Upgrade: websocket",
+            "Connection: Upgrade",
+            "Sec-WebSocket-Version: 13",
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+            "Sec-WebSocket-Protocol: foxglove.sdk.v1",
+            "",
+            "",
+        )
         s.sendall("\r\n".join(handshake).encode())
         with ViewerClient(live.url) as client:
             client.subscribe("/tcrctl/step")

@@ -112,9 +112,18 @@ def decode_frame(payload: bytes, version: Version) -> MocapFrame:
         reader.skip(size)
     suffix = _suffix(reader, layout)
     return MocapFrame(
-        number, marker_sets, unlabelled, rigid_bodies, body_markers, skeletons, assets, markers, plates,
-        devices, suffix,
-    )  # fmt: skip
+        number,
+        marker_sets,
+        unlabelled,
+        rigid_bodies,
+        body_markers,
+        skeletons,
+        assets,
+        markers,
+        plates,
+        devices,
+        suffix,
+    )
 
 
 def _section_end(reader: Reader, layout: Layout) -> int | None:

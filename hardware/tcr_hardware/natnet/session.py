@@ -66,9 +66,14 @@ class Session:
         self._models_changing = self._refresh_models = False
         self._echoes: deque[int] = deque(maxlen=ECHOES)
         self._timers = Timers(
-            now, connect=RETRY_S, bitstream=RETRY_S, models=RETRY_S, keep_alive=settings.keep_alive_s,
-            echo=settings.echo_s, silence=settings.silence_s,
-        )  # fmt: skip
+            now,
+            connect=RETRY_S,
+            bitstream=RETRY_S,
+            models=RETRY_S,
+            keep_alive=settings.keep_alive_s,
+            echo=settings.echo_s,
+            silence=settings.silence_s,
+        )
 
     @property
     def version(self) -> Version | None:

@@ -64,7 +64,11 @@ def jog(
 
     where = f"by {by_mm:g} mm" if by_mm is not None else f"to {to_mm:g} mm"
     act(
-        rig, robot, dry_run, yes, as_json,
+        rig,
+        robot,
+        dry_run,
+        yes,
+        as_json,
         lambda loaded: f"Cables {', '.join(cable)} of {loaded.robot} move {where}.",
         move,
-    )  # fmt: skip
+    )

@@ -7,7 +7,7 @@
 
 Times are those of the run: a measurement carries the middle of its exposure. When the supervisor wants the run to
 end, ``read`` or ``write`` raises its reason; ``close`` then brings the drives to rest whatever has happened.
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 

@@ -176,9 +176,14 @@ class SetPoints:
         target[cables] = self.accepted[cables]
 
     def _note(
-        self, clamps: list[Clamp], rule: str, wanted: Array | Micrometres, sent: Array | Micrometres,
-        scale: float, unit: str,
-    ) -> None:  # fmt: skip
+        self,
+        clamps: list[Clamp],
+        rule: str,
+        wanted: Array | Micrometres,
+        sent: Array | Micrometres,
+        scale: float,
+        unit: str,
+    ) -> None:
         if not np.array_equal(wanted, sent):
             for c in np.flatnonzero(wanted != sent):
                 name = self._envelope.names[c]

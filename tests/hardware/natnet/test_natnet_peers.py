@@ -232,7 +232,11 @@ def test_our_server_and_the_encoder_of_the_tests_write_the_same_bytes(version):
         sets=[(body.name, lost[body.rows]) for body in TRACKED.bodies] + [("all", lost)],
         bodies=[
             (
-                body.id, p, q, encoder.RESIDUAL, int(t),
+                body.id,
+                p,
+                q,
+                encoder.RESIDUAL,
+                int(t),
                 [(lost[row], k + 1, 0.008) for k, row in enumerate(body.rows)],
             )
             for body, p, q, t in zip(
@@ -244,6 +248,9 @@ def test_our_server_and_the_encoder_of_the_tests_write_the_same_bytes(version):
             for row, name in enumerate(NAMES)
             if name != "m1.n1"
         ],
-        latency=0.0012, timestamp=0.5, ticks=(10_000, 20_000, 30_000), params=2,
-    )  # fmt: skip
+        latency=0.0012,
+        timestamp=0.5,
+        ticks=(10_000, 20_000, 30_000),
+        params=2,
+    )
     assert sent(version, HIDDEN)[4:] == wire.frame_payload(version, content)

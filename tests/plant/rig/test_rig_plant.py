@@ -89,8 +89,11 @@ def test_the_end_of_a_run_is_a_controlled_stop_and_disarmed():
     rig.plant.close()
     assert rig.state == "disarmed"
     assert [text.partition(":")[0] for text in rig.transitions] == [
-        "disarmed -> armed", "armed -> running", "running -> stopping", "stopping -> disarmed",
-    ]  # fmt: skip
+        "disarmed -> armed",
+        "armed -> running",
+        "running -> stopping",
+        "stopping -> disarmed",
+    ]
     assert DriveControl(enable=True) in [control for _, _, control in rig.drives.sent]
     assert rig.drives.sent[-1][2] == OFF
     assert (rig.cameras.closed, rig.drives.closed) == (1, 1)

@@ -95,13 +95,26 @@ FAULTS = {
     "drives off": (status(enabled=False), SafetyState.FAULTED, RigStopError, "switched the drives off"),
     "stale for long": (replace(GOOD, age=0.2), SafetyState.STOPPING, RigStopError, "200 ms"),
     "silent": (replace(GOOD, trouble="timeout", silence=0.11), SafetyState.STOPPING, DeviceError, "110 ms"),
-    "nonsense": (replace(GOOD, trouble="swapped", hopeless=True), SafetyState.STOPPING, DeviceError, "swapped"),
-    "lag": (replace(GOOD, following=5001, laggard="c2"), SafetyState.STOPPING, RigStopError, "cable c2 is 5.00 mm"),
+    "nonsense": (
+        replace(GOOD, trouble="swapped", hopeless=True),
+        SafetyState.STOPPING,
+        DeviceError,
+        "swapped",
+    ),
+    "lag": (
+        replace(GOOD, following=5001, laggard="c2"),
+        SafetyState.STOPPING,
+        RigStopError,
+        "cable c2 is 5.00 mm",
+    ),
     "PLC sees lag": (status(following_error=True), SafetyState.STOPPING, RigStopError, "from its set-point"),
     "refused thrice": (
-        replace(status(reject="step, cable c1"), refused=3), SafetyState.STOPPING, RigStopError, "step, cable c1"
+        replace(status(reject="step, cable c1"), refused=3),
+        SafetyState.STOPPING,
+        RigStopError,
+        "step, cable c1",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("state", MOVING)
