@@ -29,7 +29,10 @@ class CalibrationError(HardwareError):
         super().__init__(
             f"calibration refused: {quantity} is {value:.4g} {unit}, limit {limit:.4g} {unit}", hint=hint
         )
-        self.quantity, self.value, self.limit, self.unit = quantity, value, limit, unit
+        self.quantity = quantity
+        self.value = value
+        self.limit = limit
+        self.unit = unit
 
 
 @dataclass(frozen=True, slots=True)

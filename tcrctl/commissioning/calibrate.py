@@ -60,7 +60,9 @@ def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool
 def _measured(client: NatNetClient, nodes: list[NodeMarker], seconds: float) -> Array:
     """Mean marker positions in the cameras' frame (n, 3)."""
     found = MarkerMap(nodes, np.zeros((len(nodes), 3)), gate=Gate(np.inf, np.inf, np.inf))
-    positions, valid, frame = [], [], None
+    positions = []
+    valid = []
+    frame = None
     end = time.monotonic() + seconds
     with device_errors("cameras"):
         found.resolve(client.wait_models())

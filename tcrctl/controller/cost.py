@@ -54,7 +54,8 @@ def input_limits(
 ) -> tuple[Array, Array]:
     """Hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
     limit = speed_limit(settings)
-    low, high = np.full(blocks * drive.shape[0], -limit), np.full(blocks * drive.shape[0], limit)
+    low = np.full(blocks * drive.shape[0], -limit)
+    high = np.full(blocks * drive.shape[0], limit)
     m = drive.shape[0]
     # a drive outside its stroke may still move back: limits never cross
     low[:m] = np.minimum(np.maximum((robot.stroke[0] - drive) / settings.period_s, -limit), limit)

@@ -57,7 +57,9 @@ def newton_map(what: str, robot: Robot, load: Load, drive: Array, q: Array) -> I
         q: Solution (3 n_nodes,) [m].
     """
     first, ws = 3 * FIXED, make_workspace(robot.model)
-    nodal, bars, cables = load.nodal.copy(), load.bar_before.copy(), load.cable_before.copy()
+    nodal = load.nodal.copy()
+    bars = load.bar_before.copy()
+    cables = load.cable_before.copy()
     at = Load(load.inertia, load.w, nodal, bars, cables, None)
 
     def apply(z: Array) -> Array:

@@ -111,7 +111,10 @@ def build_ioc(
         weights: Weights of the cost.
     """
     gain = prediction.gain
-    n, rows, size, m = gain.shape[0], gain.shape[1], gain.shape[2], prediction.free.shape[1] - POSE_ROWS
+    n = gain.shape[0]
+    rows = gain.shape[1]
+    size = gain.shape[2]
+    m = prediction.free.shape[1] - POSE_ROWS
     H, g = np.zeros((size, size)), np.zeros(size)
     for i in range(n):
         for r in range(rows):
@@ -191,7 +194,9 @@ def solve_ioc(program: QuadraticProgram, prediction: Prediction, weights: Weight
     chosen = np.zeros((prediction.free.shape[0], 2 * m), dtype=np.bool_)
     inverse = np.linalg.inv(program.H)
     U = np.zeros(program.g.shape[0])
-    pivots, residual, rows = 0, np.inf, 0
+    pivots = 0
+    residual = np.inf
+    rows = 0
     for _ in range(MAX_ROUNDS):
         A, b, D = _rows(program, prediction, weights, chosen)
         rows = b.shape[0]

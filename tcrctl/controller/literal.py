@@ -71,14 +71,18 @@ class LiteralIoc:
         """Take a ``controller:`` section and the robot."""
         self._settings, self._robot = settings, robot
         self._weights = make_weights(settings, robot.n_cables, 1)
-        self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
+        self._work = make_workspace(robot.model)
+        self._scratch = dynamics.make_scratch(robot.model)
         self.gain = np.zeros((self._work.r.shape[0], robot.n_cables))
         self._last: tuple[Array, Array, Fixed] | None = None
         self.ahead, self.blocks = np.array([settings.period_s]), 1
 
     def _load(self, at: Situation) -> tuple[Array, Load]:
         """Start positions and load of the step (12)-(14) with zero acceleration at its start; or of statics."""
-        period, s, robot, x = self._settings.period_s, self._scratch, self._robot, at.estimate
+        period = self._settings.period_s
+        s = self._scratch
+        robot = self._robot
+        x = at.estimate
         if self._settings.model == "static":
             return x.q.copy(), static_load(robot.model, robot.weight)
         c = coefficients(RHO, period)
@@ -92,7 +96,9 @@ class LiteralIoc:
 
     def _linearise(self, q: Array, drive: Array, load: Load, speed: Array) -> tuple[Array, Prediction]:
         """Newton step (n_free,) at the present input, and the outputs as (31)."""
-        period, tip, ws = self._settings.period_s, self._robot.tip, self._work
+        period = self._settings.period_s
+        tip = self._robot.tip
+        ws = self._work
         assemble(self._robot.model, q, drive, load, ws, True)
         linear.factor_shifted(ws.K, ws.U)
         change = np.zeros(ws.r.shape[0])
@@ -150,7 +156,9 @@ class LiteralIoc:
         q, load = self._load(at)
         target = make_target(self._settings, at.reference, at.shift, self._robot.n_cables)
         fixed = Fixed(at.estimate.drive.copy(), load, target, at.previous, at.low, at.high)
-        speed, change, iteration = at.previous, np.inf, 0
+        speed = at.previous
+        change = np.inf
+        iteration = 0
         solution = Solution(speed, np.inf, 0, False, 0)
         while change > EPSILON and iteration < MAX_ITERATIONS and np.all(np.isfinite(q)):
             moved, solution = self._iterate(q, speed, fixed)

@@ -106,7 +106,9 @@ def forecast(
     """
     at, q, v = memory.at, now.q, now.v
     outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
-    deviation, away, finite = np.empty(q.shape[0]), np.empty(q.shape[0]), True
+    deviation = np.empty(q.shape[0])
+    away = np.empty(q.shape[0])
+    finite = True
     for k in range(q.shape[0]):
         deviation[k] = q[k] - at.equilibrium[k]
         finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
@@ -129,7 +131,8 @@ class MultiStep:
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
         self._tuning = make_tuning(period, settings.filter_s)
-        self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
+        self._work = make_workspace(robot.model)
+        self._load = static_load(robot.model, robot.weight)
         at, still = rest_map(robot), np.zeros_like(robot.rest.q)
         q, drive = robot.rest.q.copy(), np.zeros(robot.n_cables)
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)

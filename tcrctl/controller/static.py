@@ -72,7 +72,9 @@ def forecast(
     Returns:
         Outcome of the statics, free (n, 7 + m), gain (n, 7 + m, blocks * m).
     """
-    at, offset, blend = memory.at, memory.offset, tuning.blend
+    at = memory.at
+    offset = memory.offset
+    blend = tuning.blend
     outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
     rest, answer = static_outputs(model, ws, at, tip)
     if outcome.converged and blend > 0.0 and np.isfinite(now.outputs).all():
@@ -92,7 +94,8 @@ class Static:
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
         self._tuning = make_tuning(period, settings.filter_s)
-        self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
+        self._work = make_workspace(robot.model)
+        self._load = static_load(robot.model, robot.weight)
         self._memory = StaticMemory(rest_map(robot), np.zeros(POSE_ROWS + robot.n_cables))
         self._solved = False
 

@@ -70,7 +70,9 @@ class EmulatedBench:
             InputError: If the rig file cannot be emulated.
             DeviceError: If the port of the cameras is taken.
         """
-        self._rig, self._settings, built = rig, settings, robots or {}
+        self._rig = rig
+        self._settings = settings
+        built = robots or {}
         self._random = np.random.default_rng(settings.seed)
         self._failure: Exception | None = None
         self.plcs: dict[str, PlcEmulator] = {}

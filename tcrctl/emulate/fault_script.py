@@ -187,7 +187,9 @@ class FaultPlayer:
         notify: Callable[[str], None],
     ) -> None:
         """Take a script; ``notify`` takes what happens, for people."""
-        self._motive, self._plcs, self._notify = motive, plcs, notify
+        self._motive = motive
+        self._plcs = plcs
+        self._notify = notify
         self._names = motive.tracked.names
         self._waiting = list(script.faults)
         self._active: list[tuple[float, Fault]] = []

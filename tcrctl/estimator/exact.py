@@ -33,7 +33,8 @@ class ExactState:
         del applied
         q, v = self._state()
         model, tip = self._robot.model, self._robot.tip
-        length, gradient = np.zeros(self._robot.n_cables), np.zeros((self._robot.n_cables, q.shape[0]))
+        length = np.zeros(self._robot.n_cables)
+        gradient = np.zeros((self._robot.n_cables, q.shape[0]))
         sliding_cable.path_gradients(
             q, model.first_hole, model.hole_nodes, model.hole_weights, model.cables, length, gradient
         )

@@ -262,7 +262,8 @@ def _check_sample(path: StaticPath, i: int, rows: int, robot: Robot, limits: Dri
         speed = np.abs(drive - path.drive[i - 1]) / (path.time[i] - path.time[i - 1])
         fast = int(np.argmax(speed))
         if speed[fast] > limits.speed:
-            what, hint = f"speed of drive {names[fast]}", "Lower the speed limits of the trajectory."
+            what = f"speed of drive {names[fast]}"
+            hint = "Lower the speed limits of the trajectory."
             raise InfeasibleError(t, what, 1e3 * speed[fast], 1e3 * limits.speed, "mm/s", hint=hint)
 
 

@@ -39,7 +39,9 @@ class Metrics:
             paced: Whether the clock paces the run, so that there are deadlines to miss.
         """
         self._table = np.full((steps, len(_COLUMNS)), np.nan)
-        self._steps, self._paced, self._period = 0, paced, 0.0
+        self._steps = 0
+        self._paced = paced
+        self._period = 0.0
 
     def add(self, step: StepRecord) -> None:
         """Take a step."""

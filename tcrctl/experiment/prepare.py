@@ -89,7 +89,9 @@ def _simulated(
     settings: SimulatedSettings, experiment: Experiment, operation: Operation
 ) -> tuple[RunnablePlant, TrueState]:
     del operation
-    loaded, spec, robot = experiment.loaded, experiment.spec, experiment.robot
+    loaded = experiment.loaded
+    spec = experiment.spec
+    robot = experiment.robot
     own = description_of_plant(settings, loaded.robot, loaded.plant_robot, spec.seed, robot)
     robot = robot if own is None else build_robot(own)
     plant = SimulatedPlant(settings, robot, experiment.period, spec.seed)
@@ -204,7 +206,9 @@ def build_parts(experiment: Experiment, plant: Plant, state: TrueState | None) -
         InputError: If the estimator needs a state that is not known.
         DeviceError: If the plant cannot be measured.
     """
-    spec, robot, period = experiment.spec, experiment.robot, experiment.period
+    spec = experiment.spec
+    robot = experiment.robot
+    period = experiment.period
     trajectory, offset = experiment.trajectory, np.nan
     found = measured_pose(plant, robot)
     if found is not None:

@@ -96,7 +96,8 @@ def choose_frame(loaded: LoadedIdentification, regression: Regression) -> tuple[
         NoEquilibriumError: If the robot as given has no stable shape.
         InputError: If the sizes are off by a unit, or the data are fewer than the unknowns.
     """
-    predicted, measured = regression.predict(start_of(regression.parameters)), regression.measured
+    predicted = regression.predict(start_of(regression.parameters))
+    measured = regression.measured
     known = CoordinateFrame.of(loaded.spec.frame)
     frame = plain = known.aligned(predicted, measured)
     remark = ""

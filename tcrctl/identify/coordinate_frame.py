@@ -92,7 +92,8 @@ class CoordinateFrame:
         yaw = self.yaw
         if self.free_yaw:
             p, q = a - centre[0], b - centre[1]
-            sine, cosine = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum(), (p[:, :2] * q[:, :2]).sum()
+            sine = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()
+            cosine = (p[:, :2] * q[:, :2]).sum()
             yaw = math.atan2(sine, cosine)
         found = replace(self, yaw=yaw)
         if self.free_offset:

@@ -108,7 +108,9 @@ def identify(
     evaluator = Evaluator(regression, jobs or available_cores(), interruption.check)
     work = Work(loaded, regression, predicted, frame, evaluator, best)
     evaluator.progress = lambda count: progress(work.doing, count, _shown(work))
-    held_out, judged, failure = np.full(len(regression.group_names), np.nan), None, None
+    held_out = np.full(len(regression.group_names), np.nan)
+    judged = None
+    failure = None
     with interruption, evaluator:
         try:
             _search(work)
@@ -155,7 +157,9 @@ def _shown(work: Work) -> float:
 
 def _judge(work: Work, residuals: Residuals, answer: Array) -> Certainty:
     """Sensitivities at the answer, in the parameters' own units, and what they mean."""
-    regression, best, spec = work.regression, work.best, work.loaded.spec
+    regression = work.regression
+    best = work.best
+    spec = work.loaded.spec
     residual, jacobian = residuals.value(answer), residuals.jacobian(answer)
     n = len(best.x)
     value = np.array(list(values(regression.parameters, best.x).values()))
@@ -208,7 +212,9 @@ def _result(
     remarks: tuple[str, ...],
     seconds: float,
 ) -> Result:
-    regression, best, spec = work.regression, work.best, work.loaded.spec
+    regression = work.regression
+    best = work.best
+    spec = work.loaded.spec
     predicted = regression.predict(best.x)
     errors = [
         distances(f, p, regression.measured) for f, p in ((work.frame, work.start), (best.frame, predicted))

@@ -94,7 +94,8 @@ class StepDecoder:
 
 def _rounded(step: StepRecord) -> StepRecord:
     """Return the step with single precision where no controller has seen the numbers."""
-    timing, truth = Timing(*(_single(seconds) for seconds in astuple(step.timing))), step.truth
+    timing = Timing(*(_single(seconds) for seconds in astuple(step.timing)))
+    truth = step.truth
     if truth is not None:
         truth = replace(
             truth,

@@ -80,7 +80,10 @@ class RealTime:
             clock: Never jumps [s].
             sleep: Waits for a time [s].
         """
-        self._period, self._check, self._clock, self._sleep = period, check, clock, sleep
+        self._period = period
+        self._check = check
+        self._clock = clock
+        self._sleep = sleep
         self._start: float | None = None
 
     def wait(self, t: float) -> float:

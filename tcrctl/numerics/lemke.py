@@ -206,7 +206,9 @@ def refined(C: Array, p: Array, T: Array, basis: Rows) -> Array:
         Basic values x (n,), free of the errors that the pivots accumulated.
     """
     n = p.size
-    x, residual, size = np.empty(n), np.empty(n), np.empty(n)
+    x = np.empty(n)
+    residual = np.empty(n)
+    size = np.empty(n)
     for i in range(n):
         x[i] = T[0, i]
     for _ in range(REFINEMENTS):

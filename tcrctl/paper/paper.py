@@ -143,7 +143,9 @@ def run_paper(
     Raises:
         DeviceError: If the folder cannot be made or written to.
     """
-    folder, done, begin = make_run_folder(out, "paper"), dict[Job, Done](), time.monotonic()
+    folder = make_run_folder(out, "paper")
+    done = dict[Job, Done]()
+    begin = time.monotonic()
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
 
     def keep(item: Done) -> None:

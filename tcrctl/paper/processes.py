@@ -54,11 +54,9 @@ class Processes:
             workers: How many run side by side.
         """
         self._folder, self._workers = folder, workers
-        self._lock, self._live, self._stopped = (
-            threading.Lock(),
-            set[subprocess.Popen[str]](),
-            threading.Event(),
-        )
+        self._lock = threading.Lock()
+        self._live = set[subprocess.Popen[str]]()
+        self._stopped = threading.Event()
 
     def run(self, jobs: Sequence[Job], begun: Callable[[Job], None], ended: Callable[[Done], None]) -> None:
         """Run jobs, first those that need the machine for themselves, one by one.

@@ -103,13 +103,13 @@ class ImperfectCameras:
     ) -> None:
         """Draw what stays; ``latency`` [s], ``noise`` per coordinate [m]."""
         self._random = np.random.default_rng([_seed(settings, seed), 1])
-        self._settings, self._latency, self._noise = settings, latency, noise
+        self._settings = settings
+        self._latency = latency
+        self._noise = noise
         self.draw = draw_cameras(settings, markers, seed)
         self._shapes: deque[tuple[float, Array]] = deque()
-        self._markers, self._last = (
-            markers,
-            CameraFrame(0.0, np.zeros((markers, 3)), np.zeros(markers, np.bool_)),
-        )
+        self._markers = markers
+        self._last = CameraFrame(0.0, np.zeros((markers, 3)), np.zeros(markers, np.bool_))
         self._coming, self._arrival, self._newest = 0, latency + self._late(), 0.0
 
     def watch(self, t: float, nodes: Array) -> None:

@@ -51,7 +51,8 @@ class SimulatedDrives:
     def __init__(self, settings: DriveSettings, start: Array, h: float) -> None:
         """Rest at drive lengths ``start`` (m,) [m], to be moved in internal steps of ``h`` [s]."""
         self._settings = settings
-        lag, keep = settings.lag_s, math.exp(-h / settings.lag_s) if settings.lag_s > 0.0 else 0.0
+        lag = settings.lag_s
+        keep = math.exp(-h / settings.lag_s) if settings.lag_s > 0.0 else 0.0
         sampled = h / (1.0 - keep)
         self._h, self._ahead = h, sampled - lag
         self._servos = [

@@ -63,7 +63,9 @@ class Reality:
             period: Control period [s].
             seed: Of what is random and has no seed of its own.
         """
-        self.drives, self._body, self._rows = drives, body, rows
+        self.drives = drives
+        self._body = body
+        self._rows = rows
         self._count = steps(settings, period)
         self._h = period / self._count
         self.cameras = ImperfectCameras(

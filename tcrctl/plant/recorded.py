@@ -57,7 +57,10 @@ class Recorded:
             limits: Those of the plant that was recorded if they are known.
             reports_set_points: Its drives were measured to be where they should be.
         """
-        self._steps, self._limits, self._next_k, self.limited = steps, limits, 0, None
+        self._steps = steps
+        self._limits = limits
+        self._next_k = 0
+        self.limited = None
         self._reports_set_points = reports_set_points
         self._set_point: Array | None = None
 

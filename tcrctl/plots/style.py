@@ -85,7 +85,8 @@ def time_panels(count: int, *, height_in: float = 1.5, columns: int = 1) -> tupl
 
 def span(panels: Sequence[Axes], histories: Sequence[History]) -> None:
     """Let the time axis end where the longest run does."""
-    first, last = min(history.t[0] for history in histories), max(history.t[-1] for history in histories)
+    first = min(history.t[0] for history in histories)
+    last = max(history.t[-1] for history in histories)
     for panel in panels:
         panel.set_xlim(first, last if last > first else first + 1.0)
     figure = panels[0].get_figure(root=True)

@@ -108,7 +108,9 @@ class _Replay:
         self, log: Log, origin: Origin, window: Window, tolerance: Tolerance, watch: Watch | None
     ) -> None:
         spec, self._watch = origin.wanted.spec, watch
-        self._log, self._origin, self._window = log, origin, window
+        self._log = log
+        self._origin = origin
+        self._window = window
         self._kind, self._period = spec.plant.kind, float(spec.controller.period_s)
         self.robot = build_robot(origin.wanted.robot)
         reports = _reports_set_points(origin.recorded.spec.plant)
@@ -136,7 +138,9 @@ class _Replay:
 
     def run(self, record: Record | None, progress: Progress) -> RecordingEndedError | str:
         """Replay to the end of the window or of what there is; return why it ended."""
-        parts, total, applied = self._parts(), _total(self._log, self._window), None
+        parts = self._parts()
+        total = _total(self._log, self._window)
+        applied = None
         for k in itertools.count():
             try:
                 step, broken = tick(parts, k, applied)

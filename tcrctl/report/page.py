@@ -72,7 +72,8 @@ def _cards(summary: Mapping[str, Any]) -> str:
     """Every measure, with all its numbers."""
     cards = []
     for name in dict.fromkeys(full.partition(".")[0] for full in UNITS):
-        value, unit = summary.get(name), next(u for n, u in UNITS.items() if n.partition(".")[0] == name)
+        value = summary.get(name)
+        unit = next(u for n, u in UNITS.items() if n.partition(".")[0] == name)
         if value is None:
             continue
         title = name.removesuffix(f"_{unit.replace('/', '_')}".lower()) if unit else name

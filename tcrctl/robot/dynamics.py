@@ -115,7 +115,9 @@ def lead_direction(q: Array) -> Array:
 
 def make_scratch(model: Model) -> Scratch:
     """Allocate the arrays for ``model``."""
-    size, bars, m = SIZE * (model.mass.shape[0] + 1), model.bars.shape[0], model.cables.shape[0]
+    size = SIZE * (model.mass.shape[0] + 1)
+    bars = model.bars.shape[0]
+    m = model.cables.shape[0]
     return Scratch(
         np.zeros(size),
         np.zeros(size),
@@ -227,7 +229,11 @@ def advance(
     Returns:
         (converged, residual [N], smallest internal step [s], Newton iterations).
     """
-    done, residual, smallest, halvings, iterations = 0.0, 0.0, rule.h, 0, 0
+    done = 0.0
+    residual = 0.0
+    smallest = rule.h
+    halvings = 0
+    iterations = 0
     while done < duration * (1.0 - 1e-9):
         h = min(rule.h / 2.0**halvings, duration - done)
         outcome = try_step(model, x, speed, h, rule.rho, external, ws, s)

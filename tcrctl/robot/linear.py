@@ -104,7 +104,9 @@ def couple(ws: Workspace, b: Array) -> None:
 @njit(cache=True, error_model="numpy")
 def _finish(ws: Workspace, X: Array) -> None:
     """Overwrite X (n_free, r) by U^-1 (I - W P^-1 W') X."""
-    m, size, r = ws.axial.shape[0], X.shape[0], X.shape[1]
+    m = ws.axial.shape[0]
+    size = X.shape[0]
+    r = X.shape[1]
     weight = np.zeros((m, r))
     for k in range(size):
         for c in range(m):

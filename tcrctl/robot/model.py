@@ -86,7 +86,9 @@ def _bars(d: RobotDescription, nodes: Array) -> tuple[NDArray[np.int64], Array]:
 
 def _holes(d: RobotDescription) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
     """first_hole, hole_nodes, hole_weights of all routes."""
-    nodes, weights, first = [], [], [0]
+    nodes = []
+    weights = []
+    first = [0]
     for route in cable_routes(d):
         for ring, angle in route.holes:
             nodes.append(ring_nodes(ring))
@@ -147,7 +149,8 @@ def build_model(d: RobotDescription, cable_rest: Array) -> Model:
     bar_nodes, bars = _bars(d, straight_stack(d.modules))
     routes = cable_routes(d)
     ea = np.array([route.axial_stiffness for route in routes])
-    damping, lead = np.array([route.damping for route in routes]), np.array([route.lead for route in routes])
+    damping = np.array([route.damping for route in routes])
+    lead = np.array([route.lead for route in routes])
     return freeze(
         Model(
             mass=_mass_matrix(d),

@@ -104,7 +104,9 @@ def minimise(
     Returns:
         An :class:`Outcome`.
     """
-    shift, largest, iteration = 0.0, np.inf, 0
+    shift = 0.0
+    largest = np.inf
+    iteration = 0
     p = np.empty(ws.r.shape[0])
     energy = residual(model, q, drive, load, ws)
     for iteration in range(limit + 1):

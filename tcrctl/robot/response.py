@@ -186,7 +186,9 @@ def respond(
         column c for a unit ramp of drive c (1 m/s), column m for the free motion; and whether the reduced
         tangent was positive definite.
     """
-    m, r, first = model.cables.shape[0], V.shape[1], 3 * (tip - FIXED)
+    m = model.cables.shape[0]
+    r = V.shape[1]
+    first = 3 * (tip - FIXED)
     h, steps = ahead[0], ahead.shape[0]
     for c in range(m):
         ws.axial[c] = model.cables[c, STIFFNESS]
@@ -200,7 +202,8 @@ def respond(
     CV = np.dot(pose.output_matrix(q_eq, tip), V[first : first + 9])
     x, vx, F = np.zeros((r, m + 1)), np.zeros((r, m + 1)), np.zeros((r, m + 1))
     stage1, stage2 = np.empty((r, m + 1)), np.empty((r, m + 1))
-    start, change = np.zeros((POSE_ROWS + m, m + 1)), np.zeros((steps, POSE_ROWS + m, m + 1))
+    start = np.zeros((POSE_ROWS + m, m + 1))
+    change = np.zeros((steps, POSE_ROWS + m, m + 1))
     if not block_banded.factor_diagonal(reduced):
         return change, False
     _project_state(model.mass, V, release.offset, release.v, x, vx)

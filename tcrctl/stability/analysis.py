@@ -115,7 +115,9 @@ class _Probe:
     """Takes the records of a run, and looks at the loop before the steps that were asked for."""
 
     def __init__(self, parts: Parts, wanted: Sequence[int], progress: Progress) -> None:
-        self._parts, self._wanted, self._progress = parts, frozenset(wanted), progress
+        self._parts = parts
+        self._wanted = frozenset(wanted)
+        self._progress = progress
         self.points: list[StabilityPoint] = []
         self.states, self.what = 0, ""
 

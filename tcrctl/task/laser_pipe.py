@@ -43,7 +43,10 @@ class LaserPipe:
             wanted: Their targets as the trajectory knows them.
             beam: Radius of the beam [m].
         """
-        self._pipes, self._wanted, self._beam, self._period = pipes, wanted, beam, 0.0
+        self._pipes = pipes
+        self._wanted = wanted
+        self._beam = beam
+        self._period = 0.0
         self._visits = [_Visit() for _ in pipes]
 
     def observe(self, step: StepRecord) -> list[Event]:

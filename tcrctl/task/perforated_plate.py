@@ -133,7 +133,9 @@ def nearest(
     Returns:
         The distance [m], the segment's row and the plate's; ``farthest``, -1, -1 if nothing is nearer.
     """
-    best, segment, plate = farthest, -1, -1
+    best = farthest
+    segment = -1
+    plate = -1
     a, b = np.empty(3), np.empty(3)
     for i in range(plates.half.shape[0]):
         holes = plates.holes[plates.first_hole[i] : plates.first_hole[i + 1]]
@@ -142,7 +144,9 @@ def nearest(
             _local(plates, i, end[j], b)
             distance = segment_distance(a, b, plates.half[i], holes, best, tolerance)
             if distance < best:
-                best, segment, plate = distance, j, i
+                best = distance
+                segment = j
+                plate = i
     return best, segment, plate
 
 

@@ -44,7 +44,9 @@ class ModbusServer:
 
     def __init__(self, unit: int, registers: Registers, faults: PlcFaults) -> None:
         """Serve ``registers`` as ``unit``."""
-        self.unit, self._registers, self._faults = unit, registers, faults
+        self.unit = unit
+        self._registers = registers
+        self._faults = faults
         self._functions = {
             READ_HOLDING: self._read,
             WRITE_ONE: self._write_one,

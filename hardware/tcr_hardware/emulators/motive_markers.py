@@ -117,7 +117,8 @@ class TrackedMarkers:
     def _unlabelled(self, points: NDArray[np.float64]) -> View:
         """Nothing is recognised: points in an order of their own."""
         n, b = len(points), len(self.bodies)
-        ids, upright = FIRST_POINT_CLOUD_ID + np.arange(n), np.tile([0.0, 0.0, 0.0, 1.0], (b, 1))
+        ids = FIRST_POINT_CLOUD_ID + np.arange(n)
+        upright = np.tile([0.0, 0.0, 0.0, 1.0], (b, 1))
         nothing = np.zeros((len(self.names), 3))
         return View(
             nothing, points, np.zeros((b, 3)), upright, np.zeros(b, bool), ids, points, np.full(n, UNLABELLED)

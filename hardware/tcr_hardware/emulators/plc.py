@@ -223,7 +223,9 @@ class PlcEmulator:
 
     def _values(self, block: str) -> Values:
         """Values of a read-only block by name."""
-        program, limits, axes = self._program, self._settings.limits, self._settings.axes
+        program = self._program
+        limits = self._settings.limits
+        axes = self._settings.axes
         if block == "status":
             slack = self._tensions_known and min(self._tensions) < SLACK_N
             return {

@@ -34,7 +34,10 @@ class PlcImage:
             faults: Faults that show in registers.
             values: Values of a read-only block by name, now.
         """
-        self._map, self._low_first, self._faults, self._values = rows, low_first, faults, values
+        self._map = rows
+        self._low_first = low_first
+        self._faults = faults
+        self._values = values
         self._first, count = rows.span("command")
         self._command = [0] * count
         self._frozen: dict[str, Sequence[float]] = {}

@@ -70,7 +70,9 @@ class PlcBus:
         probe = self._map["MAGIC"].address
         self._link = ModbusLink(settings.link, settings.unit, settings.timeout_s, probe, dial)
         self._one_request = settings.exchange != "fc16_fc3"
-        self._blocks, self._counters, self._liveness = Blocks(self._map, WordCodec()), Counters(), Liveness()
+        self._blocks = Blocks(self._map, WordCodec())
+        self._counters = Counters()
+        self._liveness = Liveness()
         self._info: PlcInfo | None = None
         self._is_open = False  # stays so while a lost connection waits for its next attempt
         self.statistics = BusStatistics()

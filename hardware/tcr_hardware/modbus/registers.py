@@ -223,7 +223,9 @@ def _wrong(name: str, change: Mapping[str, object]) -> list[str]:
         for key in change
         if key not in ("address", "kind", "scale")
     ]
-    address, kind, scale = change.get("address", 0), change.get("kind", "u16"), change.get("scale", 1.0)
+    address = change.get("address", 0)
+    kind = change.get("kind", "u16")
+    scale = change.get("scale", 1.0)
     if isinstance(address, bool) or not isinstance(address, int) or not 0 <= address <= 0xFFFF:
         problems.append(f"{name}.address: {address!r} is not a whole number from 0 to 65535")
     if kind not in WIDTHS:
@@ -247,7 +249,8 @@ def _unusable(rows: tuple[Register, ...]) -> list[str]:
         problems.append(f"SEQ has to be the last register of the command block, not {command[-1].name}")
     for block in BLOCKS:
         members = [row for row in ordered if row.block == block]
-        span, most = members[-1].end - members[0].address, MOST_WRITTEN if block == "command" else MOST_READ
+        span = members[-1].end - members[0].address
+        most = MOST_WRITTEN if block == "command" else MOST_READ
         if block == "command" and span != sum(row.words for row in members):
             problems.append("the command block has a gap; it is written as one piece")
         if span > most:

@@ -52,7 +52,9 @@ class ServerClock:
 
     def reset(self, hz: int) -> None:
         """Begin anew with a server whose clock has ``hz`` ticks per second (0: it has none)."""
-        self.hz, self.best, self.round_trip = hz, None, None
+        self.hz = hz
+        self.best = None
+        self.round_trip = None
 
     def add(self, sent: float, received: float, ticks: int) -> bool:
         """Take an echo: our times of request and answer [s], the server's time between them [ticks].

@@ -187,7 +187,9 @@ def _rigid_bodies(reader: Reader, layout: Layout) -> Records:
 def _bodies_with_markers(reader: Reader, layout: Layout) -> tuple[Records, tuple[BodyMarkers, ...]]:
     """Rigid bodies before 3.0: each carries its markers."""
     count = reader.items("rigid bodies", _BODY.size + 8)
-    packed, markers, start = bytearray(count * RIGID_BODY.itemsize), [], 0
+    packed = bytearray(count * RIGID_BODY.itemsize)
+    markers = []
+    start = 0
     for _ in range(count):
         head = reader.unpack(_BODY)
         n = reader.count("markers of a body", POINT.itemsize + 8)

@@ -106,7 +106,9 @@ def _camera(reader: Reader, version: Version, found: _Found) -> None:
 
 
 def _asset(reader: Reader, version: Version, found: _Found) -> None:
-    name, _, asset_id = reader.text(), reader.integer(), reader.integer()
+    name = reader.text()
+    reader.integer()
+    asset_id = reader.integer()
     for _ in range(reader.items("bones", 21)):
         _body(reader, version)
     markers = []

@@ -27,7 +27,10 @@ class Receiver:
     """
 
     def __init__(self, sockets: Sockets, session: Session, inbox: Inbox, server: tuple[str, int]) -> None:
-        self._sockets, self._session, self._inbox, self._server = sockets, session, inbox, server
+        self._sockets = sockets
+        self._session = session
+        self._inbox = inbox
+        self._server = server
         self.foreign = 0
         session.last_problem = sockets.note
         self._stopping = threading.Event()

@@ -90,7 +90,9 @@ class VersionChoice:
         return False
 
     def _open(self) -> None:
-        self.pending, self._tries, self._set_requests = True, 0, 0
+        self.pending = True
+        self._tries = 0
+        self._set_requests = 0
 
     def _told(self, text: str) -> None:
         try:

@@ -48,7 +48,9 @@ def jog(
     from tcrctl.errors import InputError
     from tcrctl.loop.interruption import Interruption
 
-    cable, by_mm, to_mm = wanted.cable, wanted.by_mm, wanted.to_mm
+    cable = wanted.cable
+    by_mm = wanted.by_mm
+    to_mm = wanted.to_mm
     if (by_mm is None) == (to_mm is None):
         raise InputError("give either --by-mm or --to-mm")
 

@@ -106,7 +106,9 @@ class NatNetCameras:
             InputError: If a label is not known there.
         """
         self.client = connect(cameras)
-        self._settings, self._last, self._bits = cameras, None, b""
+        self._settings = cameras
+        self._last = None
+        self._bits = b""
         try:
             with device_errors(f"cameras at {cameras.server}"):
                 self.rate = cameras.rate_hz or self.client.frame_rate()

@@ -110,7 +110,9 @@ class SetPoints:
         self.accepted: Micrometres = np.array(start, dtype=np.int64)
         self._before, self._exact = self.accepted, self.accepted.astype(float)
         self._speed = np.zeros(self.accepted.shape[0])
-        self._next, self._next_exact, self._next_speed = self.accepted, self._exact, self._speed
+        self._next = self.accepted
+        self._next_exact = self._exact
+        self._next_speed = self._speed
 
     def propose(self, speed: Array) -> tuple[Micrometres, tuple[Clamp, ...]]:
         """Set-points for the coming period, and what had to be changed to stay inside the limits.
@@ -132,7 +134,9 @@ class SetPoints:
     def accept(self) -> None:
         """Note that the drives have got what was proposed last."""
         self._before = self.accepted
-        self.accepted, self._exact, self._speed = self._next, self._next_exact, self._next_speed
+        self.accepted = self._next
+        self._exact = self._next_exact
+        self._speed = self._next_speed
 
     def start_again(self) -> None:
         """Note that they have not got it: the next proposal starts at what they got before, from standstill."""
