@@ -28,7 +28,7 @@ NAMES = [f"b{k % 6}.n{k // 6}" for k in range(50)]
 
 
 def timed(function, repeat: int) -> np.ndarray:
-    """Durations of single calls [us]."""
+    """Return the durations of single calls [us]."""
     times = np.empty(repeat)
     for k in range(repeat):
         start = time.perf_counter()

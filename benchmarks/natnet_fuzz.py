@@ -36,7 +36,7 @@ COUNTS = (-1, -(2**31), 2**31 - 1, 2**16, 1_000, 1_001, 5_461, 255)
 
 
 def samples() -> list[tuple[Version, int, bytes]]:
-    """Good packets: version, message, payload."""
+    """Return good packets: version, message, payload."""
     names = [f"b{k % 6}.n{k // 6}" for k in range(50)]
     positions = np.random.default_rng(0).normal(size=(50, 3))
     tracked = TrackedMarkers(names, positions)
@@ -99,7 +99,7 @@ def outcome_of(version: Version, message: int, payload: bytes) -> tuple[str, flo
 
 
 def attack(packets: int, seed: int) -> tuple[collections.Counter[str], float, int]:
-    """Outcomes, worst time [s], and, while memory is traced, the largest allocation of a decoder [byte]."""
+    """Return outcomes, worst time [s], and, while memory is traced, the largest allocation of a decoder [byte]."""
     rng, good, sessions = random.Random(seed), samples(), {}
     outcomes: collections.Counter[str] = collections.Counter()
     worst, largest = 0.0, 0

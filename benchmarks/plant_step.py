@@ -45,7 +45,7 @@ def speeds(t: float, m: int) -> Array:
 
 
 def run(robot: Robot, seconds: float, h: float, friction: float | None = None) -> tuple[Array, Array]:
-    """Wall time of every step [us] and its Newton iterations."""
+    """Return the wall time of every step [us] and its Newton iterations."""
     model, m, slip = robot.model, robot.n_cables, None
     if friction is not None:
         holes = hole_friction(FrictionSettings(coefficient=friction), model.first_hole)
@@ -66,7 +66,7 @@ def run(robot: Robot, seconds: float, h: float, friction: float | None = None) -
 
 
 def realistic(robot: Robot, seconds: float, h: float) -> float:
-    """Wall time of a step [us] of a plant that is all of *moderate*, its periods of 50 ms as a whole."""
+    """Return the wall time of a step [us] of a plant that is all of *moderate*, its periods of 50 ms as a whole."""
     ideal = SimulatedSettings(kind="simulated", step_ms=1e3 * h, realistic="moderate", scatter=None)
     plant = SimulatedPlant(as_drawn(ideal, robot.n_cables, 1), robot, 0.05, 1)
     times = []
@@ -79,7 +79,7 @@ def realistic(robot: Robot, seconds: float, h: float) -> float:
 
 
 def solves(robot: Robot, step: float, repeats: int = 300) -> tuple[float, float, float]:
-    """Median time [us] of the structured and of the dense solve, and the largest relative difference."""
+    """Return the median time [us] of the structured and of the dense solve, and the largest relative difference."""
     model, m = robot.model, robot.n_cables
     nodal = np.zeros((4, robot.rest.q.size))
     nodal[FORCE] = robot.weight

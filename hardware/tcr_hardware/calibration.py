@@ -145,7 +145,7 @@ def _check_spread(places: Array) -> None:
 
 
 def _check_scale(points: Array, places: Array) -> float:
-    """Relative error of distances; a wrong unit shows as a power of ten."""
+    """Return the relative error of distances; a wrong unit shows as a power of ten."""
     sizes = [np.linalg.norm(each - each.mean(axis=0)) for each in (points, places)]
     error = float(sizes[0] / sizes[1] - 1.0)
     if not abs(error) <= LARGEST_SCALE_ERROR:
@@ -155,7 +155,7 @@ def _check_scale(points: Array, places: Array) -> float:
 
 
 def _rotation(points: Array, places: Array) -> Array:
-    """Best proper rotation of centred ``points`` to ``places`` [K76]."""
+    """Return the best proper rotation of centred ``points`` to ``places`` [K76]."""
     u, _, vt = np.linalg.svd((points - points.mean(axis=0)).T @ (places - places.mean(axis=0)))
     handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
     rotation: Array = vt.T @ handed @ u.T
@@ -163,7 +163,7 @@ def _rotation(points: Array, places: Array) -> Array:
 
 
 def _heading(points: Array, places: Array, up: Array) -> Array:
-    """Best rotation that takes ``up`` to z."""
+    """Return the best rotation that takes ``up`` to z."""
     side = np.roll(up, 1)
     upright = np.array([side, np.cross(up, side), up])
     flat = (points - points.mean(axis=0)) @ upright.T

@@ -200,7 +200,7 @@ class MarkerMap:
         return known
 
     def _by_number(self, data: MocapFrame, reasons: NDArray[np.object_]) -> Array:
-        """Positions (n, 3) of labelled nodes in the rig frame; fills in why they cannot be used."""
+        """Return the positions (n, 3) of labelled nodes in the rig frame; fills in why they cannot be used."""
         found = np.full((len(self.nodes), 3), np.nan)
         rows = {number: row for row, number in enumerate(data.markers["id"].tolist())}
         at = np.array([rows.get(number, -1) for number in self._ids.tolist()])
@@ -239,7 +239,7 @@ def _check_shared(nodes: Sequence[NodeMarker]) -> None:
 
 
 def _points_without_name(data: MocapFrame) -> NDArray[np.float32]:
-    """Unlabelled points (k, 3): from their own list, or (newer servers) flagged among the labelled markers."""
+    """Return unlabelled points (k, 3): from their own list, or (newer servers) flagged among labelled markers."""
     points = data.unlabelled
     if not len(points):
         points = data.markers["position"][data.markers["params"] & UNLABELLED != 0]

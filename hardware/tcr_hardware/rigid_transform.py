@@ -54,7 +54,7 @@ class RigidTransform:
         return ((np.asarray(points, float) - self.translation) @ self.rotation) / self.scale_m
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for a file: quaternion x, y, z, w, translation [m], scale [m]."""
+        """Return plain numbers for a file: quaternion x, y, z, w, translation [m], scale [m]."""
         quaternion: list[float] = Rotation.from_matrix(self.rotation).as_quat(canonical=True).tolist()
         return {
             "quaternion_xyzw": quaternion,

@@ -113,7 +113,7 @@ def in_counts(position: float, count: float) -> float:
 
 
 def braking_speed(distance: float, limits: ServoSettings, dt: float) -> float:
-    """Largest speed from which a drive stops within a distance, when its speed changes once per ``dt`` only.
+    """Return largest speed from which a drive stops within a distance, when its speed changes once per ``dt`` only.
 
     Braking from (n + f) steps of speed, 0 <= f < 1, takes (n + 1) (n / 2 + f) steps of distance.
     """

@@ -142,7 +142,7 @@ def _content(files: RunFiles, name: str) -> Any:
 
 
 def _flat(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Leaves of nested maps by dotted key; a list is a leaf."""
+    """Return the leaves of nested maps by dotted key; a list is a leaf."""
     if not isinstance(value, dict):
         if prefix:
             yield prefix, value

@@ -184,7 +184,7 @@ def read_histories(
 
 
 def _labels(logs: Sequence[Log]) -> list[str]:
-    """Shortest names that tell the runs apart: experiment, or with what was set, or with the run's id."""
+    """Return shortest names that tell the runs apart: experiment, or with what was set, or with the run's id."""
     spec = [log.start.get("spec") or log.path.stem for log in logs]
     overrides = [" ".join(_overrides(log)) for log in logs]
     found = []

@@ -85,7 +85,7 @@ class LogInfo:
         return [item for item in found if isinstance(item, dict)] if isinstance(found, list) else []
 
     def as_json(self) -> dict[str, Any]:
-        """One object for ``info --json``; keys are the attributes, and ``criteria``."""
+        """Return one object for ``info --json``; keys are the attributes, and ``criteria``."""
         return {**asdict(self), "criteria": self.criteria}
 
 

@@ -58,7 +58,7 @@ def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool
 
 
 def _measured(client: NatNetClient, nodes: list[NodeMarker], seconds: float) -> Array:
-    """Mean marker positions in the cameras' frame (n, 3)."""
+    """Return the mean marker positions in the cameras' frame (n, 3)."""
     found = MarkerMap(nodes, np.zeros((len(nodes), 3)), gate=Gate(np.inf, np.inf, np.inf))
     positions = []
     valid = []

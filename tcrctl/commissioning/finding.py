@@ -27,5 +27,5 @@ class Finding:
 
 
 def worst(findings: Sequence[Finding]) -> int:
-    """Exit code of the first finding that is not as it should be; 0 if all are."""
+    """Return the exit code of the first finding that is not as it should be; 0 if all are."""
     return next((finding.exit_code for finding in findings if finding.exit_code), 0)

@@ -40,7 +40,7 @@ class Jog:
     speed: float
 
     def distances(self, names: tuple[str, ...], now: Array) -> Array:
-        """How far every cable has to move (m,) [m] from where it is ``now`` (m,) [m]."""
+        """Return how far every cable has to move (m,) [m] from where it is ``now`` (m,) [m]."""
         moving = np.array([name in self.cables for name in names])
         wanted = np.full(len(names), self.by) if self.to is None else self.to - now
         return np.where(moving, wanted, 0.0)
@@ -101,7 +101,7 @@ def jog_rig(
 
 
 def _rate(k: int, duration: float) -> float:
-    """Share of the distance per second in step k: (1 - cos) / T, exact in sum over a whole number of steps."""
+    """Return the distance's share per second in step k: (1 - cos) / T, exact in sum over all steps."""
     steps = step_count(duration, PERIOD)
     if k >= steps:
         return 0.0
@@ -109,7 +109,7 @@ def _rate(k: int, duration: float) -> float:
 
 
 def _check(jog: Jog, limits: RigLimits, names: tuple[str, ...], target: Array, distance: Array) -> float:
-    """Duration [s] of a motion whose highest speed, twice the mean, is the one asked for."""
+    """Return the duration [s] of a motion whose highest speed, twice the mean, is the one asked for."""
     unknown = [name for name in jog.cables if name not in names]
     if unknown:
         raise InputError(f"there is no cable {unknown[0]}; there are {', '.join(names)}")

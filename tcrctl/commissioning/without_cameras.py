@@ -22,4 +22,4 @@ class WithoutCameras:
         return Sighting(time.monotonic(), np.zeros((0, 3), np.float32), np.zeros(0, np.bool_), "", none)
 
     def close(self) -> None:
-        """Nothing to close."""
+        """Do nothing: there is nothing to close."""

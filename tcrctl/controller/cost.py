@@ -13,7 +13,7 @@ from tcrctl.signals import Array, Estimate, Reference
 
 
 def make_weights(settings: IocSettings, m: int, instants: int) -> Weights:
-    """Weights of (30) for ``m`` cables; position-only tracking has no weight on normal and twist.
+    """Return the weights of (30) for ``m`` cables; position-only tracking has no weight on normal and twist.
 
     The output weights are shared out over the prediction ``instants``, so that the cost is their mean and R and W
     mean the same whatever their number. W is what keeps the loop stable when the plant's slow modes are faster
@@ -52,7 +52,7 @@ def make_target(settings: IocSettings, reference: Reference, shift: Array, m: in
 def input_limits(
     settings: IocSettings | KinematicSettings, robot: Robot, drive: Array, blocks: int
 ) -> tuple[Array, Array]:
-    """Hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
+    """Return hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
     limit = speed_limit(settings)
     low = np.full(blocks * drive.shape[0], -limit)
     high = np.full(blocks * drive.shape[0], limit)
@@ -64,7 +64,7 @@ def input_limits(
 
 
 def pose_error(reference: Reference, position: Array, normal: Array) -> Array:
-    """Wanted minus measured end pose (6,): position [m], normal (0 where it is not tracked)."""
+    """Return the wanted minus measured end pose (6,): position [m], normal (0 where it is not tracked)."""
     turned = np.zeros(3) if reference.normal is None else reference.normal - normal
     return np.concatenate([reference.position - position, turned])
 

@@ -25,7 +25,7 @@ SLACK = 1e-6
 
 @njit(cache=True, error_model="numpy")
 def needed_speeds(gain: Array, output: Array, poses: Array, edges: Array, spacing: float) -> Array:
-    """Speeds w (blocks, m) [m/s] with which the end, always at rest, follows the reference.
+    """Return the speeds w (blocks, m) [m/s] with which the end, always at rest, follows the reference.
 
     Args:
         gain: S, position and normal by the drives at rest (6, m).
@@ -70,7 +70,7 @@ def wanted_changes(previous: Array, needed_before: Array, needed: Array) -> Arra
 
 
 def reference_poses(reference: Reference) -> Array:
-    """Position and normal now and at the instants (n + 1, 6); a normal that is not wanted stands still."""
+    """Return position and normal now and at the instants (n + 1, 6); a normal that is not wanted stands still."""
     poses = np.zeros((reference.ahead_position.shape[0] + 1, 6))
     poses[0, :3], poses[1:, :3] = reference.position, reference.ahead_position
     if reference.normal is not None and reference.ahead_normal is not None:

@@ -95,7 +95,7 @@ class LiteralIoc:
         return q0, Load(inertia, 2.0 / period, nodal, bars, cables, None)
 
     def _linearise(self, q: Array, drive: Array, load: Load, speed: Array) -> tuple[Array, Prediction]:
-        """Newton step (n_free,) at the present input, and the outputs as (31)."""
+        """Return the Newton step (n_free,) at the present input, and the outputs as (31)."""
         period = self._settings.period_s
         tip = self._robot.tip
         ws = self._work
@@ -115,7 +115,7 @@ class LiteralIoc:
         return change, Prediction((now - gain[0] @ speed)[None], gain)
 
     def _iterate(self, q: Array, speed: Array, fixed: Fixed) -> tuple[Array, Solution]:
-        """(28) with (36): change of the free coordinates (n_free,), and the new input with proof."""
+        """Return (28) with (36): change of the free coordinates (n_free,), and the new input with proof."""
         period = self._settings.period_s
         change, prediction = self._linearise(q, fixed.drive + period * speed, fixed.load, speed)
         program = build_ioc(prediction, fixed.target, fixed.previous, fixed.low, fixed.high, self._weights)
@@ -123,7 +123,7 @@ class LiteralIoc:
         return change + period * (self.gain @ (solution.inputs - speed)), solution
 
     def sharpen(self) -> None:
-        """Nothing to do: (41) always ends with a whole Newton step."""
+        """Do nothing: (41) always ends with a whole Newton step."""
 
     def memory(self) -> Mapping[str, Kept]:
         """Return nothing: all but the last input is in the estimate."""

@@ -86,7 +86,7 @@ WALL = 1e6
 
 @njit(cache=True, error_model="numpy")
 def _first_positive(y: Array, n: int) -> int:
-    """Index of the first of n increasing values that is not negative; n if all are."""
+    """Return the index of the first of n increasing values that is not negative; n if all are."""
     for i in range(n):
         if y[i] >= 0.0:
             return i
@@ -95,7 +95,7 @@ def _first_positive(y: Array, n: int) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _root(x: Array, y: Array, n: int, right: float) -> float:
-    """Where the increasing function through n corners (x, y) is zero; y[0] < 0, slope ``right`` behind the last."""
+    """Find the zero of the increasing function through n corners (x, y); y[0] < 0, slope ``right`` at the end."""
     i = _first_positive(y, n)
     if i == n:
         return float(x[n - 1] - y[n - 1] / right)
@@ -140,7 +140,7 @@ def _only_taut(x: Array, y: Array, n: int, right: float) -> int:
 
 @njit(cache=True, error_model="numpy")
 def solve_chain(s: Stretches, cap: Array, first: int, last: int) -> None:
-    """Tensions of one cable, stretches ``first`` .. ``last``: fills tension and alone from wanted and stiffness."""
+    """Solve one cable, stretches ``first`` .. ``last``: fills tension and alone from wanted and stiffness."""
     x, y = s.knots[0], s.knots[1]
     x[0], y[0], x[1], y[1] = 0.0, -WALL, 0.0, -s.wanted[first] / s.stiffness[first]
     n, right = 2, 1.0 / s.stiffness[first]
@@ -206,7 +206,7 @@ def tensions(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) ->
 
 @njit(cache=True, error_model="numpy")
 def group_start(s: Stretches, first: int, stretch: int) -> int:
-    """First stretch of the group that ends with ``stretch``: holes between them slip."""
+    """Return the first stretch of the group that ends with ``stretch``: holes between them slip."""
     while stretch > first and s.tension[stretch - 1] != s.alone[stretch - 1]:
         stretch -= 1
     return stretch
@@ -214,7 +214,7 @@ def group_start(s: Stretches, first: int, stretch: int) -> int:
 
 @njit(cache=True, error_model="numpy")
 def group_stiffness(s: Stretches, start: int, end: int) -> float:
-    """Stiffness of stretches ``start`` .. ``end`` in series [N/m]; 0 if slackness holds their tension."""
+    """Return stiffness of stretches ``start`` .. ``end`` in series [N/m]; 0 if slackness holds their tension."""
     if s.alone[end] <= 0.0:
         return 0.0
     compliance = 0.0

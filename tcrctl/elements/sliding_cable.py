@@ -24,7 +24,7 @@ REST, STIFFNESS, DAMPING, LEAD = range(4)
 
 @njit(cache=True, error_model="numpy")
 def hole_position(q: Array, nodes: np.ndarray, weights: Array, hole: int) -> tuple[float, float, float]:
-    """Position of ``hole`` [m]; nodes (n_holes, 3) and weights (n_holes, 3)."""
+    """Return the position of ``hole`` [m]; nodes (n_holes, 3) and weights (n_holes, 3)."""
     a, b, c = 3 * nodes[hole, 0], 3 * nodes[hole, 1], 3 * nodes[hole, 2]
     wa, wb, wc = weights[hole, 0], weights[hole, 1], weights[hole, 2]
     return (
@@ -36,7 +36,7 @@ def hole_position(q: Array, nodes: np.ndarray, weights: Array, hole: int) -> tup
 
 @njit(cache=True, error_model="numpy")
 def segment(q: Array, nodes: np.ndarray, weights: Array, hole: int) -> tuple[float, float, float, float]:
-    """Length [m] and direction of the segment from ``hole`` to the next one."""
+    """Return the length [m] and direction of the segment from ``hole`` to the next one."""
     x0, y0, z0 = hole_position(q, nodes, weights, hole)
     x1, y1, z1 = hole_position(q, nodes, weights, hole + 1)
     dx, dy, dz = x1 - x0, y1 - y0, z1 - z0
@@ -86,6 +86,6 @@ def path_gradients(
 
 @njit(cache=True, error_model="numpy")
 def tension(total: float, w: float, before: float, cables: Array, c: int) -> float:
-    """λ = T [N] >= 0 of cable ``c`` at ``total`` = l + d [m] with dl/dt + u = w (total - before)."""
+    """Return λ = T [N] >= 0 of cable ``c`` at ``total`` = l + d [m] with dl/dt + u = w (total - before)."""
     T = cables[c, STIFFNESS] * (total - cables[c, REST]) + cables[c, DAMPING] * w * (total - before)
     return float(max(T, 0.0))

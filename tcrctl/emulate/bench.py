@@ -117,7 +117,7 @@ class EmulatedBench:
         return EmulatedRobot(real.robot, real.plant, drives, tensions)
 
     def _markers(self) -> Array:
-        """All markers in the frame of the cameras (n, 3) [m]."""
+        """Return all markers in the frame of the cameras (n, 3) [m]."""
         try:
             exact = np.concatenate([self._seen(name) for name in self.robots])
         except Exception as error:
@@ -130,7 +130,7 @@ class EmulatedBench:
         return np.asarray(noisy)
 
     def _seen(self, name: str) -> Array:
-        """Markers of one robot in the frame of the cameras (3 + 3 n_modules, 3) [m]."""
+        """Return the markers of one robot in the frame of the cameras (3 + 3 n_modules, 3) [m]."""
         return self._back[name].inverse_apply(self._real[name].markers(self.robots[name].rings()))
 
     def __enter__(self) -> Self:
@@ -219,7 +219,7 @@ def _address(mounted: MountedRobot) -> tuple[str, int]:
 
 
 def marker_names(rig: RigFile) -> list[str]:
-    """Names of all markers on a rig, as Motive streams them.
+    """Return the names of all markers on a rig, as Motive streams them.
 
     Args:
         rig: The bench.
@@ -235,7 +235,7 @@ def marker_names(rig: RigFile) -> list[str]:
 
 
 def _labels(mounted: MountedRobot, modules: int) -> list[str]:
-    """Names of all markers of a robot: base ring, then ring by ring."""
+    """Return the names of all markers of a robot: base ring, then ring by ring."""
     markers = mounted.markers
     if markers.labels is None:
         raise InputError("markers.labels is needed to emulate a rig; markers.nodes alone is not enough")

@@ -164,7 +164,7 @@ def load_fault_script(
 def _strangers(
     fault: Fault, at: Keys, robots: Collection[str] | None, markers: Collection[str] | None
 ) -> Iterator[Finding]:
-    """Names in a fault that nobody on the rig has."""
+    """Return the names in a fault that nobody on the rig has."""
     if robots is not None and fault.robot is not None and fault.robot not in robots:
         yield (*at, "robot"), f"there is no robot {fault.robot} on the rig; there are {', '.join(robots)}"
     for key, value in fault.cameras.items() if isinstance(fault.cameras, dict) else ():

@@ -63,7 +63,7 @@ class EmulatedRobot:
         self._rings = np.array([*ring_nodes(0), *ring_rows(robot.n_modules)])
 
     def rings(self) -> Array:
-        """All ring nodes now, those of the base first (3 + 3 n_modules, 3) [m].
+        """Return all ring nodes now, those of the base first (3 + 3 n_modules, 3) [m].
 
         Raises:
             DivergenceError: If the simulation broke down.

@@ -25,7 +25,7 @@ class ExactState:
         self._robot, self._state = robot, state
 
     def memory(self) -> Mapping[str, Kept]:
-        """Nothing: the plant remembers."""
+        """Return nothing: the plant remembers."""
         return {}
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:

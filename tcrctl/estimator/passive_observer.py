@@ -67,7 +67,7 @@ class PassiveObserver:
         self._valid, self._seen = np.zeros(rows.shape[0], dtype=np.bool_), self._coordinates[:0]
 
     def _load(self, measured: Measurement) -> Load:
-        """Inertia of backward Euler, weight and virtual springs of one update."""
+        """Return the inertia of backward Euler, weight and virtual springs of one update."""
         period = self._period
         s = self._scratch
         model = self._robot.model

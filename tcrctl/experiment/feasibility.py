@@ -88,7 +88,7 @@ class StaticPath:
         return speed
 
     def as_json(self) -> dict[str, dict[str, float]]:
-        """Extremes for ``run --dry-run --json``."""
+        """Return the extremes for ``run --dry-run --json``."""
         return {
             "drive_mm": {"min": 1e3 * float(self.drive.min()), "max": 1e3 * float(self.drive.max())},
             "drive_speed_mm_s": {"max": 1e3 * float(np.abs(self.speed).max())},
@@ -228,7 +228,7 @@ def _newton_step(robot: Robot, target: Array, held: Held, limits: DriveLimits) -
 
 
 def _tensions(robot: Robot, held: Held) -> tuple[Array, Array]:
-    """Tensions (m,) [N], negative for what a slack cable lacks, and their derivatives (m, m) [N/m]."""
+    """Return the tensions (m,) [N], negative for what a slack cable lacks, and their derivatives (m, m) [N/m]."""
     model, q = robot.model, held.shape.q
     length, G = np.zeros(robot.n_cables), np.zeros((robot.n_cables, q.size))
     sliding_cable.path_gradients(

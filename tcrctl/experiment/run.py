@@ -212,7 +212,7 @@ def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractCo
 
 
 def _start_message(offset: float, approach: float) -> tuple[str, str]:
-    """Level and text of what is known about the start: offset [m], and time [s] that the way there takes."""
+    """Return level and text of what is known about the start: offset [m], and time [s] that the way there takes."""
     if math.isnan(offset):
         return (
             "warning",
@@ -250,7 +250,7 @@ def _summary(
 
 
 def _outcome(failure: TcrctlError | None, verdicts: tuple[Verdict, ...]) -> tuple[str, str, int]:
-    """Status, reason and exit code of a run."""
+    """Return the status, reason and exit code of a run."""
     if failure is not None:
         aborted = isinstance(failure, StoppedError | RunInterruptedError)
         return "aborted" if aborted else "error", str(failure), failure.exit_code

@@ -26,7 +26,7 @@ class Best:
 
     @classmethod
     def none(cls, x: Array, frame: CoordinateFrame) -> Best:
-        """Where a method starts."""
+        """Return where a method starts."""
         return cls(np.inf, x.copy(), frame)
 
     def offer(self, cost: float, x: Array, frame: CoordinateFrame) -> None:

@@ -143,7 +143,7 @@ def _check_size(regression: Regression, predicted: Array) -> None:
 
 
 def assumed_forces(robot: RobotDescription, free: Sequence[str], *, moving: bool) -> dict[str, float]:
-    """Values that fix the scale of forces without having been measured, by path.
+    """Return the values that fix the scale of forces without having been measured, by path.
 
     Moduli, masses, tensions and dampings times one factor move nothing. A weighed module fixes that factor; the
     initial tension is assumed even then. If the module's mass is to be found too, everything else is assumed.
@@ -162,7 +162,7 @@ def assumed_forces(robot: RobotDescription, free: Sequence[str], *, moving: bool
 
 
 def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
-    """Every number of a robot as plain data, by dotted path."""
+    """Return every number of a robot as plain data, by dotted path."""
     if isinstance(data, dict | list):
         for key, value in data.items() if isinstance(data, dict) else enumerate(data):
             yield from _numbers(value, f"{path}.{key}" if path else str(key))

@@ -132,7 +132,7 @@ def _square(tall: Array) -> Array:
 
 
 def _inverse(scaled: Array) -> Array:
-    """(S'S)^-1, infinite for parameters with a part in a direction that S does not see."""
+    """Return (S'S)^-1, infinite for parameters with a part in a direction that S does not see."""
     _, s, vt = np.linalg.svd(scaled, full_matrices=False)
     blind = s <= ROUNDING * max(float(s[0]), 1.0)
     inverse: Array = (vt[~blind].T / s[~blind] ** 2) @ vt[~blind]
@@ -151,7 +151,7 @@ def _combinations(
 def _combination(
     parameters: Sequence[Parameter], value: Array, unit: Array, v: Array, s: float, assumed: str = ""
 ) -> Combination:
-    """Direction ``v`` in tolerances as relative changes, the largest member 1."""
+    """Return the direction ``v`` in tolerances as relative changes, the largest member 1."""
     change = v * unit / np.where(value != 0.0, np.abs(value), 1.0)
     largest = change[int(np.argmax(np.abs(change)))]
     weights = {

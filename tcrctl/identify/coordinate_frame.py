@@ -55,7 +55,7 @@ class CoordinateFrame:
         return replace(self, yaw=yaw, offset=values[-3:] if self.free_offset else self.offset)
 
     def turned(self, model: Array) -> Array:
-        """Vectors (..., 3) of the robot's frame in the measurement's frame."""
+        """Return the vectors (..., 3) of the robot's frame in the measurement's frame."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         if self.mirrored:
@@ -64,7 +64,7 @@ class CoordinateFrame:
         return out
 
     def place(self, model: Array) -> Array:
-        """Positions (n, 3) [m] of the robot's frame in the measurement's frame."""
+        """Return the positions (n, 3) [m] of the robot's frame in the measurement's frame."""
         return self.turned(model) + self.offset
 
     def slopes(self, model: Array) -> Array:

@@ -17,7 +17,7 @@ from tcrctl.signals import Array
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """Return the cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -41,14 +41,14 @@ class Evaluator:
     _workers: Workers | None = field(default=None, repr=False)
 
     def predict(self, x: Array) -> Array | None:
-        """Prediction (n, 3) [m] at ``x`` of the unit cube, None if the robot has no shape there."""
+        """Return the prediction (n, 3) [m] at ``x`` of the unit cube, None if the robot has no shape there."""
         self.check()
         found = prediction(self.regression, x)
         self.count(1)
         return found
 
     def predict_many(self, points: Sequence[Array]) -> list[Array | None]:
-        """Predictions at several points, side by side."""
+        """Return the predictions at several points, side by side."""
         if self.jobs == 1 or len(points) == 1:
             return [self.predict(x) for x in points]
         if self._workers is None:
@@ -56,7 +56,7 @@ class Evaluator:
         return self._workers.predict(points, self._done)
 
     def slopes(self, x: Array, predicted: Array) -> Array:
-        """∂(prediction)/∂x (n, 3, n_parameters): analytic for statics, differences for logs.
+        """Return ∂(prediction)/∂x (n, 3, n_parameters): analytic for statics, differences for logs.
 
         Args:
             x: Place in the unit cube.
@@ -88,7 +88,7 @@ class Evaluator:
         self.check()
 
     def __enter__(self) -> Self:
-        """Nothing is started yet."""
+        """Return itself: nothing is started yet."""
         return self
 
     def __exit__(

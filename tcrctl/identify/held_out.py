@@ -19,7 +19,7 @@ from tcrctl.signals import Array
 
 
 def held_out_errors(evaluator: Evaluator, residuals: Residuals, answer: Array) -> Array:
-    """Mean error of every group (n_groups,) [mm] after an identification without it.
+    """Return the mean error of every group (n_groups,) [mm] after an identification without it.
 
     NaN where the other groups have fewer coordinates than there are unknowns, or where no answer was found.
 
@@ -56,7 +56,7 @@ def _refitted(evaluator: Evaluator, residuals: Residuals, answer: Array, rest: N
 
 
 def _stepped(residuals: Residuals, answer: Array, rests: list[NDArray[np.bool_]]) -> list[Array]:
-    """Answers from the coordinates of each of ``rests`` alone, to first order, within the bounds."""
+    """Return the answers from the coordinates of each of ``rests`` alone, to first order, within the bounds."""
     jacobian, value = residuals.jacobian(answer), residuals.value(answer)
     n, found = len(residuals.evaluator.regression.parameters), []
     for rest in rests:

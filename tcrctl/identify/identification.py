@@ -73,7 +73,7 @@ class Work:
         return ~np.isnan(self.regression.measured)
 
     def errors(self, frame: CoordinateFrame, predicted: Array) -> Array:
-        """Distances of all measured points [mm]."""
+        """Return the distances of all measured points [mm]."""
         return distances(frame, predicted, self.regression.measured)[self.used.any(axis=1)]
 
 
@@ -127,7 +127,7 @@ def identify(
 
 
 def _search(work: Work) -> None:
-    """All methods one after the other, each from the answer of the one before."""
+    """Run all methods one after the other, each from the answer of the one before."""
     spec = work.loaded.spec
     for method in spec.method.split("+"):
         work.doing = method
@@ -148,7 +148,7 @@ def _stage(work: Work, method: str, evaluations: int, seconds: float) -> Stage:
 
 
 def _shown(work: Work) -> float:
-    """Mean error of the best answer so far [mm], for the progress display; in least squares an rms."""
+    """Return the mean error of the best answer so far [mm], for the progress display; in least squares an rms."""
     if work.doing == "pso":
         return work.best.cost
     count = max(1, int(work.used.any(axis=1).sum()))
@@ -156,7 +156,7 @@ def _shown(work: Work) -> float:
 
 
 def _judge(work: Work, residuals: Residuals, answer: Array) -> Certainty:
-    """Sensitivities at the answer, in the parameters' own units, and what they mean."""
+    """Return the sensitivities at the answer, in the parameters' own units, and what they mean."""
     regression = work.regression
     best = work.best
     spec = work.loaded.spec

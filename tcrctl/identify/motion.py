@@ -17,7 +17,7 @@ SPECTRAL_RADIUS = 0.8
 
 
 def marker_motion(robot: Robot, recording: Recording, h: float) -> Array:
-    """Marker positions at the recording's frames (f, k, 3) [m].
+    """Return the marker positions at the recording's frames (f, k, 3) [m].
 
     Args:
         robot: The robot; it starts at rest with the first drive lengths.
@@ -52,7 +52,7 @@ def marker_motion(robot: Robot, recording: Recording, h: float) -> Array:
 
 
 def _between(time: Array, q: Array, v: Array, at: Array) -> Array:
-    """Cubic Hermite interpolation of q (n, c) with slopes v at instants ``at`` (f,) within ``time`` (n,)."""
+    """Return cubic Hermite interpolation of q (n, c) with slopes v at instants ``at`` (f,) within ``time`` (n,)."""
     k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     width = (time[k + 1] - time[k])[:, None]
     s = ((at - time[k])[:, None]) / width

@@ -38,7 +38,7 @@ class Parameter:
     log: bool
 
     def value(self, x: float) -> float:
-        """Value at ``x`` of the unit interval."""
+        """Return the value at ``x`` of the unit interval."""
         if self.log:
             return float(self.low * (self.high / self.low) ** x)
         return float(self.low + (self.high - self.low) * x)
@@ -57,7 +57,7 @@ class Parameter:
 
 
 def values(parameters: Sequence[Parameter], x: Array) -> dict[str, float]:
-    """Values by path at ``x`` (n,) of the unit cube."""
+    """Return the values by path at ``x`` (n,) of the unit cube."""
     return {p.path: p.value(float(u)) for p, u in zip(parameters, x, strict=True)}
 
 
@@ -67,7 +67,7 @@ def start_of(parameters: Sequence[Parameter]) -> Array:
 
 
 def split(path: str) -> Keys:
-    """Keys of a dotted path; numbers are list indices."""
+    """Return the keys of a dotted path; numbers are list indices."""
     return tuple(int(key) if key.isdecimal() else key for key in path.split("."))
 
 

@@ -42,7 +42,7 @@ class Residuals:
     _jacobian: tuple[Array, Array] | None = None
 
     def value(self, z: Array) -> Array:
-        """Differences [mm] at parameters and frame unknowns z = (x, frame)."""
+        """Return the differences [mm] at parameters and frame unknowns z = (x, frame)."""
         x, frame = self.split(z)
         predicted = self._prediction(x)
         if predicted is None:
@@ -71,7 +71,7 @@ class Residuals:
         return found
 
     def split(self, z: Array) -> tuple[Array, CoordinateFrame]:
-        """Parameters and frame of the unknowns."""
+        """Return the parameters and frame of the unknowns."""
         n = len(self.evaluator.regression.parameters)
         return z[:n], self.frame.with_unknowns(z[n:])
 

@@ -88,7 +88,7 @@ class Regression:
         return np.array(kept), np.array([row[self.reference, names[i][1]] for i in kept])
 
     def relative(self, points: Array) -> Array:
-        """Displacements from the reference configuration, of points (n, 3, ...); all of them without one."""
+        """Return displacements from the reference configuration, of points (n, 3, ...); all of them without one."""
         if not self.reference:
             return points
         kept, reference = self._reference_rows
@@ -100,7 +100,7 @@ class Regression:
         return with_values(self.robot, values(self.parameters, x))
 
     def predict(self, x: Array) -> Array:
-        """Model positions or displacements of all compared points (n, 3) [m], robot frame.
+        """Return the model positions or displacements of all compared points (n, 3) [m], robot frame.
 
         Raises:
             NoEquilibriumError: If the robot has no stable shape.
@@ -114,7 +114,7 @@ class Regression:
         return self.relative(np.concatenate(parts))
 
     def static_slopes(self, x: Array) -> Array:
-        """∂(prediction)/∂x (n, 3, n_parameters) for static data alone, through the tangent.
+        """Return ∂(prediction)/∂x (n, 3, n_parameters) for static data alone, through the tangent.
 
         Raises:
             NoEquilibriumError: As :meth:`predict`.
@@ -132,7 +132,7 @@ class Regression:
         return self.relative(np.concatenate(parts))
 
     def difference_points(self, x: Array) -> list[tuple[Array, float]]:
-        """Points beside ``x`` in the unit cube and signed deviations, one per parameter, for finite differences."""
+        """Return points beside ``x`` in the unit cube and signed deviations, one per parameter, for differences."""
         points = []
         for j in range(len(x)):
             deviation = UNIT_DEVIATION if x[j] + UNIT_DEVIATION <= 1.0 else -UNIT_DEVIATION
@@ -150,12 +150,12 @@ class Regression:
         return replace(self, parameters=tuple(parameters))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what is derived."""
+        """Leave out what is derived."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
 def distances(frame: CoordinateFrame, predicted: Array, measured: Array) -> Array:
-    """Distance between prediction and measurement (n,) [mm] over the measured coordinates of each point."""
+    """Return distance between prediction and measurement (n,) [mm] over the measured coordinates of each point."""
     difference = MM * (frame.place(predicted) - measured)
     out: Array = np.sqrt(np.nansum(difference**2, axis=1))
     return out

@@ -109,7 +109,7 @@ class Result:
         return (*map(str, combinations), *self.remarks)
 
     def as_json(self, robot_file: Path | None = None, figure: Path | None = None) -> dict[str, Any]:
-        """One object for ``identify --json``; what is not known is null.
+        """Return one object for ``identify --json``; what is not known is null.
 
         Args:
             robot_file: Where the new robot was written.

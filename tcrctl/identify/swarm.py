@@ -63,7 +63,7 @@ def search(
 
 
 def _moved(place: Array, velocity: Array) -> tuple[Array, Array]:
-    """Places one iteration later, and velocities; who would leave the cube stops at its face and turns round."""
+    """Move for one iteration; who would leave the cube stops at its face and turns round."""
     ahead = place + velocity
     outside = (ahead < 0.0) | (ahead > 1.0)
     return np.clip(ahead, 0.0, 1.0), np.where(outside, -REBOUND * velocity, velocity)

@@ -30,7 +30,7 @@ _STATE: Final = attrgetter(
 
 
 def checksums(step: StepRecord) -> Checksums:
-    """Digests of a step that has its full state.
+    """Return the digests of a step that has its full state.
 
     Each is the CRC-32 (of zlib) over the little-endian numbers of its fields in the order above; a field that is
     None counts as the one byte 0xff.

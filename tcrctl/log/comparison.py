@@ -26,7 +26,7 @@ _SPARSE: Final = (
 
 
 def quantities(*left_out: str) -> dict[str, Column]:
-    """Quantities of a step by path, in the order in which they come about; without parts ``left_out``.
+    """Return the quantities of a step by path, in the order in which they come about; without parts ``left_out``.
 
     Args:
         *left_out: How the paths of what is left out begin.
@@ -188,7 +188,7 @@ class Comparison:
 
 
 def _get(get: Callable[[StepRecord], Any], step: StepRecord) -> Any:
-    """Value of a step; None if the record that it belongs to is lacking."""
+    """Return the value of a step; None if the record that it belongs to is lacking."""
     try:
         return get(step)
     except AttributeError:
@@ -205,7 +205,7 @@ def _bits(values: Any) -> Any:
 
 
 def ulps(one: Any, other: Any) -> int | None:
-    """Representable numbers between two finite floats; None for anything else."""
+    """Return the representable numbers between two finite floats; None for anything else."""
     if not (
         isinstance(one, float) and isinstance(other, float) and math.isfinite(one) and math.isfinite(other)
     ):
@@ -214,13 +214,13 @@ def ulps(one: Any, other: Any) -> int | None:
 
 
 def _rank(number: float) -> int:
-    """Index of a float in the order of all floats; -0.0 comes right before 0.0."""
+    """Return the index of a float in the order of all floats; -0.0 comes right before 0.0."""
     bits = int(np.float64(number).view(np.int64))
     return bits if bits >= 0 else -(bits & 0x7FFF_FFFF_FFFF_FFFF) - 1
 
 
 def _sizes(was: Any, now: Any) -> NDArray[np.float64]:
-    """Absolute differences of all numbers, empty if that has no meaning."""
+    """Return the absolute differences of all numbers, empty if that has no meaning."""
     if isinstance(was, str) or was is None or now is None or np.shape(was) != np.shape(now):
         return np.zeros(0)
     size = np.abs(np.asarray(now, dtype=np.float64) - np.asarray(was, dtype=np.float64)).ravel()

@@ -26,7 +26,7 @@ class CableHoles:
     weights: Array
 
     def points(self, nodes: Array) -> Array:
-        """Hole positions (n_holes, 3) [m] for node positions ``nodes`` (n_nodes, 3) [m]."""
+        """Return the hole positions (n_holes, 3) [m] for node positions ``nodes`` (n_nodes, 3) [m]."""
         hole: Array = np.einsum("hj,hjx->hx", self.weights, nodes[self.nodes])
         return hole
 

@@ -115,7 +115,7 @@ class Scene:
 
 
 def _locked(update: SceneUpdate, name: str, frame: str, when: Timestamp) -> SceneEntity:
-    """Entity that follows its frame."""
+    """Return the entity that follows its frame."""
     return update.entities.add(id=name, frame_id=frame, timestamp=when, frame_locked=True)
 
 

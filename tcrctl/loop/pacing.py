@@ -22,16 +22,16 @@ class Pace(Protocol):
         ...
 
     def now(self) -> float:
-        """Time of a clock that never jumps, for measuring durations [s]."""
+        """Return the time of a clock that never jumps, for measuring durations [s]."""
         ...
 
     def time(self) -> float:
-        """Time of the run [s]: that of the step that is due now; 0 before the first."""
+        """Return the time of the run [s]: that of the step that is due now; 0 before the first."""
         ...
 
 
 def _go_on() -> None:
-    """Nothing asks the run to stop."""
+    """Do nothing: nothing asks the run to stop."""
 
 
 class Unpaced:

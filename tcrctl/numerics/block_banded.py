@@ -175,7 +175,7 @@ def multiply_columns(A: Array, X: Array, out: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def to_dense(A: Array) -> Array:
-    """Dense symmetric matrix (n b, n b) of a block-banded one; for tests and small offline work."""
+    """Return the dense symmetric matrix (n b, n b) of a block-banded one; for tests and small offline work."""
     size = A.shape[0] * A.shape[2]
     dense = np.empty((size, size))
     multiply_columns(A, np.eye(size), dense)

@@ -29,7 +29,7 @@ class Coefficients(NamedTuple):
 
 @njit(cache=True)
 def coefficients(spectral_radius: float, h: float) -> Coefficients:
-    """Coefficients for ``spectral_radius`` ρ in [0, 1] at infinite frequency and internal step ``h`` [s], (15)."""
+    """Return (15) for ``spectral_radius`` ρ in [0, 1] at infinite frequency and internal step ``h`` [s]."""
     rho = spectral_radius
     alpha_m = (2.0 * rho - 1.0) / (rho + 1.0)
     alpha_f = rho / (rho + 1.0)

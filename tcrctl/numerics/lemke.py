@@ -142,7 +142,7 @@ def _subtract_basis_product(C: Array, basis: Rows, x: Array, y: Array, size: Arr
 
 @njit(cache=True)
 def _leaving_row(T: Array, column: Array, noise: Array, basis: Rows) -> int:
-    """Lexicographic minimum ratio test on the rows [B^-1 p, B^-1] / column; -1 if no row limits the step.
+    """Do the lexicographic minimum ratio test on rows [B^-1 p, B^-1] / column; -1 if no row limits the step.
 
     Rows tie if their ratio is below every ratio after all basic values are raised by TIE (Harris), so no
     basic value falls below -TIE of itself. A tied artificial variable leaves first: that ends the method.

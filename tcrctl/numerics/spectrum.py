@@ -46,7 +46,7 @@ class Spectrum(NamedTuple):
 
 
 def derivative(apply: Map, size: int, deviation: float, *, central: bool = False) -> Map:
-    """Product of the Jacobian of a map at 0 with a vector, by differences.
+    """Return the product of the Jacobian of a map at 0 with a vector, by differences.
 
     Args:
         apply: The map from deviations (size,) to images.
@@ -69,7 +69,7 @@ def derivative(apply: Map, size: int, deviation: float, *, central: bool = False
 
 
 def jacobian(apply: Map, size: int, deviation: float) -> Array:
-    """Jacobian of a map at 0, column by column, by central differences; arguments as in :func:`derivative`."""
+    """Return a map's Jacobian at 0, column by column, by central differences; arguments as :func:`derivative`."""
     return _columns(derivative(apply, size, deviation, central=True), size)
 
 

@@ -66,7 +66,7 @@ class Report:
         return f"missed: {', '.join(self.missed)}" if self.missed else ""
 
     def notes(self) -> list[str]:
-        """Sentences that belong below the table."""
+        """Return sentences that belong below the table."""
         verdicts = [line.verdict for line in self.lines if line.row.must is not None]
         met, goals, idle = (
             sum(v in wanted for v in verdicts) for wanted in (("met", "goal"), ("goal",), ("not run",))

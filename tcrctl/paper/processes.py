@@ -151,7 +151,7 @@ def _object(printed: str) -> Mapping[str, Any]:
 
 
 def _failure(code: int, result: Mapping[str, Any], said: str) -> str:
-    """Why a job that ended with an exit code has nothing to be measured; a missed criterion is no failure."""
+    """Say why a job that ended with an exit code has nothing to be measured; a missed criterion is no failure."""
     if code in (0, 3) and result:
         return ""
     last = said.strip().splitlines()[-1:] or ["it said nothing"]

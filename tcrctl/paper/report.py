@@ -44,7 +44,7 @@ class Line:
     logs: tuple[str, ...]
 
     def cells(self) -> tuple[str, ...]:
-        """Texts in the order of ``TITLES``."""
+        """Return texts in the order of ``TITLES``."""
         row, sign = self.row, ">= " if self.row.at_least else ""
         work = f"{row.work} [{row.unit}]" if row.unit else row.work
         bars = ("" if limit is None else f"{sign}{limit:g}" for limit in (row.must, row.goal))

@@ -69,7 +69,7 @@ def ending(name: str) -> Callable[[Sequence[Result]], str]:
 
 
 def beams(results: Sequence[Result]) -> str:
-    """How many beams pass."""
+    """Return how many beams pass."""
     passed = found(results[0], "task.targets.beam_passes")
     return f"{sum(passed)} of {len(passed)}"
 

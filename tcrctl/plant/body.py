@@ -77,7 +77,7 @@ class Body:
             raise DivergenceError(t, residual, smallest)
 
     def follow(self, cable: Array, h: float, force: Array, t: float) -> None:
-        """One internal step ``h`` [s] to the cable taken in at its end (m,) [m], and what slowly follows.
+        """Go one internal step ``h`` [s] to the cable taken in at its end (m,) [m], and let follow what is slow.
 
         Raises:
             DivergenceError: If it did not converge.
@@ -93,7 +93,7 @@ class Body:
                 slip.rest[:] += grown
 
     def _elastic(self) -> Array:
-        """Elastic elongations of the cables (m,) or, where they rub, of their stretches (n_holes,) [m]."""
+        """Return elastic elongations of the cables (m,) or, where they rub, of their stretches (n_holes,) [m]."""
         slip = self.state.slip
         if slip is None:
             return np.asarray(self.tension / self.model.cables[:, sliding_cable.STIFFNESS])

@@ -117,7 +117,7 @@ class ImperfectCameras:
         self._shapes.append((t, nodes))
 
     def without_noise(self) -> None:
-        """From now on report what is seen without noise."""
+        """Report what is seen without noise from now on."""
         self._noise = 0.0
 
     def read(self, now: float, carries: NDArray[np.bool_], seen: Seen) -> CameraFrame:
@@ -141,11 +141,11 @@ class ImperfectCameras:
         return bool(self._random.random() < share)
 
     def _late(self) -> float:
-        """Time by which a frame comes later than usual [s]."""
+        """Return the time by which a frame comes later than usual [s]."""
         return 1e-3 * self._settings.age_jitter_ms * abs(float(self._random.standard_normal()))
 
     def _exposure(self, now: float) -> float:
-        """When the newest frame that has arrived was taken; before the run everything stood still."""
+        """Return when the newest frame that has arrived was taken; before the run everything stood still."""
         rate = self._settings.rate_hz
         if rate is None:
             return max(now - self._latency - self._late(), self._last.t)
@@ -156,7 +156,7 @@ class ImperfectCameras:
         return self._newest
 
     def _shape(self, t: float) -> Array:
-        """Ring nodes at ``t``; older shapes are not asked for any more."""
+        """Return the ring nodes at ``t``; older shapes are not asked for any more."""
         shapes = self._shapes
         while len(shapes) > 1 and shapes[1][0] <= t:
             shapes.popleft()
@@ -166,7 +166,7 @@ class ImperfectCameras:
         return np.asarray(x0 + (x1 - x0) * max(0.0, (t - t0) / (t1 - t0)))
 
     def _reported(self, nodes: Array) -> Array:
-        """Markers in the frame that the cameras take for that of the robot (n_markers, 3) [m]."""
+        """Return the markers in the frame that the cameras take for that of the robot (n_markers, 3) [m]."""
         markers = self.draw.in_frame(self.draw.beside(nodes))
         markers = markers + self._noise * self._random.standard_normal(markers.shape)
         wild = self._random.random(self._markers) < self._settings.outliers.share

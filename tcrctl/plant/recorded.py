@@ -90,10 +90,10 @@ class Recorded:
         return self.step.applied
 
     def close(self) -> None:
-        """Nothing to leave safe."""
+        """Do nothing: there is nothing to leave safe."""
 
     def state(self) -> tuple[Array, Array]:
-        """State (q, v) that an estimator of kind ``exact`` was given.
+        """Return the state (q, v) that an estimator of kind ``exact`` was given.
 
         Raises:
             InputError: If the log holds the full state of some steps only.

@@ -72,7 +72,7 @@ def _drawing(panel: Axes, histories: Sequence[History]) -> None:
 
 
 def _plane(paths: Sequence[Array]) -> tuple[int, int]:
-    """Axes of the projection in which the path is largest; from above if it hardly moves."""
+    """Return the axes of the projection in which the path is largest; from above if it hardly moves."""
     extent = np.ptp(np.concatenate(paths), axis=0)
     if np.max(extent) < 1e-3 * _POINT_MM:
         return 0, 1

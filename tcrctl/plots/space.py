@@ -36,7 +36,7 @@ def draw_body(axes: Any, nodes: Array, structure: Structure | None) -> None:
 
 
 def ring_outline(corners: Array) -> Array:
-    """Points (37, 3) on the circle through three nodes (3, 3) of a ring."""
+    """Return points (37, 3) on the circle through three nodes (3, 3) of a ring."""
     centre = corners.mean(axis=0)
     arm, other = corners[0] - centre, corners[1] - corners[2]
     across = other * np.linalg.norm(arm) / np.linalg.norm(other)

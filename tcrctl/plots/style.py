@@ -69,7 +69,7 @@ def new_figure(height_in: float) -> Figure:
 
 
 def time_panels(count: int, *, height_in: float = 1.5, columns: int = 1) -> tuple[Figure, list[Axes]]:
-    """Figure with ``count`` panels that share the time axis; ``height_in`` is that of one row."""
+    """Make a figure with ``count`` panels that share the time axis; ``height_in`` is that of one row."""
     rows = -(-count // columns)
     figure = new_figure(height_in * rows + 0.6)
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
@@ -95,7 +95,7 @@ def span(panels: Sequence[Axes], histories: Sequence[History]) -> None:
 
 
 def line(index: int) -> dict[str, Any]:
-    """Colour and dashes of the ``index``-th of several equal lines."""
+    """Return the colour and dashes of the ``index``-th of several equal lines."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
 
 
@@ -133,7 +133,7 @@ def _same(a: Array, b: Array) -> bool:
 
 
 def legend(figure: Figure, panels: Sequence[Axes]) -> None:
-    """One legend above all panels, every name once."""
+    """Draw one legend above all panels, every name once."""
     found: dict[str, Any] = {}
     for panel in panels:
         handles, names = panel.get_legend_handles_labels()

@@ -108,7 +108,7 @@ def _chart(
 
 
 def _robot(history: History) -> dict[str, Any] | None:
-    """Shapes and what joins their nodes; None if the log has no shapes."""
+    """Return the shapes and what joins their nodes; None if the log has no shapes."""
     if not len(history.shape):
         return None
     frames = _frames(history)
@@ -138,20 +138,20 @@ def _robot(history: History) -> dict[str, Any] | None:
 
 
 def _frames(history: History) -> NDArray[np.int64]:
-    """Rows of ``history.shape`` that are shown."""
+    """Return the rows of ``history.shape`` that are shown."""
     t = history.t[history.shape_step]
     wanted = int(FRAME_RATE_HZ * (t[-1] - t[0])) + 1
     return _every(len(t), min(MOST_FRAMES, max(wanted, 2)))
 
 
 def _grid(nodes: Array) -> tuple[Array, float]:
-    """Middle and step of a grid of 16-bit integers that holds all nodes."""
+    """Return the middle and step of a grid of 16-bit integers that holds all nodes."""
     low, high = nodes.min(axis=(0, 1)), nodes.max(axis=(0, 1))
     return (low + high) / 2.0, max(float(np.max(high - low)), 1e-6) / 65530.0
 
 
 def _every(count: int, most: int) -> NDArray[np.int64]:
-    """At most ``most`` of ``count`` rows, equally far apart, first and last among them."""
+    """Return at most ``most`` of ``count`` rows, equally far apart, first and last among them."""
     return np.unique(np.round(np.linspace(0, count - 1, min(count, most))).astype(np.int64))
 
 

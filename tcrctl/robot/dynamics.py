@@ -75,12 +75,12 @@ class Scratch(NamedTuple):
 
 
 def rest_state(q: Array, drive: Array, slip: Slip | None = None) -> State:
-    """State at rest in configuration ``q`` with ``drive``; copies both."""
+    """Make the state at rest in configuration ``q`` with ``drive``; copies both."""
     return State(q.copy(), np.zeros_like(q), np.zeros_like(q), np.zeros_like(q), drive.copy(), slip)
 
 
 def unworn(model: Model, q: Array, drive: Array, tension: Array, holes: Array) -> Slip:
-    """Slip of cables that lie in their holes without any friction force: one tension along each.
+    """Return the slip of cables that lie in their holes without any friction force: one tension along each.
 
     Args:
         model: Robot arrays.
@@ -172,7 +172,7 @@ def _finish_slip(model: Model, slip: Slip | None, s: Any) -> None:
 def try_step(
     model: Model, x: State, speed: Array, h: float, rho: float, external: Array, ws: Workspace, s: Scratch
 ) -> Outcome:
-    """One internal step of size ``h`` [s]; changes ``x`` only if it converges."""
+    """Try one internal step of size ``h`` [s]; changes ``x`` only if it converges."""
     c = coefficients(rho, h)
     lengths_before(model, x.q, x.v, x.drive, speed, 0.5 * h, s, ws)
     _begin_slip(model, x.q, x.drive, h, x.slip, ws.stretches, s.lead)

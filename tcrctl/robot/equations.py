@@ -165,7 +165,7 @@ def _group_row(model: Model, s: Stretches, start: int, end: int, row: Array) -> 
 
 @njit(cache=True, error_model="numpy")
 def _add_groups(model: Model, c: int, ws: Workspace, s: Stretches) -> None:
-    """Stiffness of the groups of cable ``c``: one stretch goes into the banded part, several share a row."""
+    """Add the groups of cable ``c``: one stretch goes into the banded part, several share a row."""
     first, end = model.first_hole[c], model.first_hole[c + 1] - 1
     while end > first:
         start = rubbing_cable.group_start(s, first, end)

@@ -27,7 +27,7 @@ SHIFT_GROWTH = 30.0
 
 @njit(cache=True, error_model="numpy")
 def _copy(K: Array, U: Array) -> None:
-    """U = K in plain loops, which compile in a tenth of the time of a slice assignment."""
+    """Set U = K in plain loops, which compile in a tenth of the time of a slice assignment."""
     for j in range(K.shape[0]):
         for d in range(K.shape[1]):
             for a in range(K.shape[2]):
@@ -68,7 +68,7 @@ def factor_shifted(K: Array, U: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def in_use(ws: Workspace, stretches: Stretches | None) -> Workspace:
-    """``ws`` with as many rank-1 rows as are in use: cables, or groups of stretches of cables that rub."""
+    """Return ``ws`` with as many rank-1 rows as are in use: cables, or groups of stretches of cables that rub."""
     if stretches is None:
         return ws
     r, size = stretches.groups[0], ws.r.shape[0]
@@ -149,7 +149,7 @@ def solve_many(ws: Workspace, X: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def drive_gain(ws: Workspace, gain: Array) -> None:
-    """∂q/∂d = -A^-1 G' C at the configuration in ``ws``.
+    """Fill ∂q/∂d = -A^-1 G' C at the configuration in ``ws``.
 
     Args:
         ws: U, G and axial stiffness; ``columns`` and ``small`` as :func:`couple` left them.
@@ -165,7 +165,7 @@ def drive_gain(ws: Workspace, gain: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def tension_gain(ws: Workspace, gain: Array) -> Array:
-    """∂λ/∂d = C (I + G ∂q/∂d) (m, m) [N/m] for the ``gain`` of :func:`drive_gain`."""
+    """Return ∂λ/∂d = C (I + G ∂q/∂d) (m, m) [N/m] for the ``gain`` of :func:`drive_gain`."""
     m = ws.axial.shape[0]
     out = np.zeros((m, m))
     for c in range(m):

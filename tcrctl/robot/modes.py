@@ -31,7 +31,7 @@ class Modes(NamedTuple):
 
 
 def mass_matrix(model: Model) -> Array:
-    """Dense mass matrix of the free coordinates (n_free, n_free) [kg]."""
+    """Return the dense mass matrix of the free coordinates (n_free, n_free) [kg]."""
     from scipy.linalg import block_diag
 
     M: Array = block_diag(*model.mass)
@@ -39,7 +39,7 @@ def mass_matrix(model: Model) -> Array:
 
 
 def modes(model: Model, equilibrium: Equilibrium, drive: Array, external: Array, count: int) -> Modes:
-    """Lowest modes about a stable equilibrium.
+    """Return the lowest modes about a stable equilibrium.
 
     Args:
         model: Robot arrays.

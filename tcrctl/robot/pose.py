@@ -11,7 +11,7 @@ from tcrctl.signals import Array
 
 @njit(cache=True, error_model="numpy")
 def position(q: Array, ring: int) -> Array:
-    """Centroid (3,) [m] of the ring whose first node is row ``ring`` of ``q`` (3 n_nodes,)."""
+    """Return the centroid (3,) [m] of the ring whose first node is row ``ring`` of ``q`` (3 n_nodes,)."""
     y = np.zeros(3)
     for node in range(ring, ring + 3):
         for a in range(3):
@@ -21,7 +21,7 @@ def position(q: Array, ring: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def _area_vector(q: Array, ring: int) -> Array:
-    """(r2 - r1) x (r3 - r2) (3,) [m2]: +z at rest for nodes counter-clockwise seen from +z."""
+    """Return (r2 - r1) x (r3 - r2) (3,) [m2]: +z at rest for nodes counter-clockwise seen from +z."""
     a, b, c = 3 * ring, 3 * ring + 3, 3 * ring + 6
     d = np.empty(3)
     for k in range(3):
@@ -41,7 +41,7 @@ def normal(q: Array, ring: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def twist(q: Array, ring: int) -> float:
-    """Rotation [rad] of the ring about its normal against the shortest rotation from rest (node 1 on +x)."""
+    """Return rotation [rad] of the ring about its normal against the shortest rotation from rest (node 1 on +x)."""
     n, y = normal(q, ring), position(q, ring)
     arm, ahead = np.empty(3), np.empty(3)
     for a in range(3):

@@ -45,7 +45,7 @@ class Outcome(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _largest(x: Array) -> float:
-    """Largest magnitude in x; NaN if there is one."""
+    """Return the largest magnitude in x; NaN if there is one."""
     out = 0.0
     for value in x:
         if not abs(value) <= out:

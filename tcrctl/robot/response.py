@@ -51,7 +51,7 @@ class Release(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def mass_columns(mass: Array, X: Array, out: Array) -> None:
-    """out = M X for columns X (n_free, r)."""
+    """Set out = M X for columns X (n_free, r)."""
     for k in range(X.shape[0]):
         i, a = k // SIZE, k % SIZE
         for c in range(X.shape[1]):
@@ -65,7 +65,7 @@ def mass_columns(mass: Array, X: Array, out: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _orthonormalise(mass: Array, V: Array, MV: Array) -> None:
-    """Gram-Schmidt in the mass inner product on the columns of V (n_free, r); fills MV = M V.
+    """Orthonormalise the columns of V (n_free, r) in the mass inner product (Gram-Schmidt); fills MV = M V.
 
     Dependent columns become zero. Rows of the transposed copies are vectors, so that inner loops are contiguous.
     """
@@ -94,7 +94,7 @@ def _orthonormalise(mass: Array, V: Array, MV: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def refine_basis(model: Model, ws: Workspace, V: Array) -> None:
-    """One orthogonal iteration of the modes in V; its last m columns become the static answers to the drives.
+    """Iterate the modes in V once; its last m columns become the static answers to the drives.
 
     Args:
         model: Robot arrays.
@@ -114,7 +114,7 @@ def refine_basis(model: Model, ws: Workspace, V: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _project(ws: Workspace, V: Array, GV: Array) -> Array:
-    """Reduced stiffness V'AV (r, r); fills GV = G V (m, r)."""
+    """Return the reduced stiffness V'AV (r, r); fills GV = G V (m, r)."""
     size, r = V.shape
     KV = np.empty((size, r))
     block_banded.multiply_columns(ws.K, V, KV)
@@ -140,7 +140,7 @@ def _project(ws: Workspace, V: Array, GV: Array) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def _stage(U: Array, a: float, b: float, t: float, x: Array, v: Array, F: Array, X: Array) -> None:
-    """X = (a I + V'AV)^-1 (a x + b v + t F): reduced positions of one stage from its explicit parts x, v."""
+    """Set X = (a I + V'AV)^-1 (a x + b v + t F): reduced positions of a stage from its explicit parts x, v."""
     for i in range(X.shape[0]):
         for c in range(X.shape[1]):
             X[i, c] = a * x[i, c] + b * v[i, c] + t * F[i, c]
@@ -150,7 +150,7 @@ def _stage(U: Array, a: float, b: float, t: float, x: Array, v: Array, F: Array,
 
 @njit(cache=True, error_model="numpy")
 def _observe(CV: Array, GV: Array, axial: Array, t: float, x: Array, out: Array) -> None:
-    """out (7 + m, m + 1) = end pose and tension changes that belong to reduced positions x (r, m + 1)."""
+    """Fill out (7 + m, m + 1), end pose and tension changes of reduced positions x (r, m + 1)."""
     m = axial.shape[0]
     out[:POSE_ROWS] = np.dot(CV, x)
     out[POSE_ROWS:] = np.dot(GV, x)
@@ -231,7 +231,7 @@ def respond(
 
 @njit(cache=True, error_model="numpy")
 def _project_state(mass: Array, V: Array, offset: Array, v: Array, x: Array, vx: Array) -> None:
-    """Last columns of x, vx (r, m + 1) = V'M offset, V'M v: the part of the state that the basis can show."""
+    """Set last columns of x, vx (r, m + 1) to V'M offset, V'M v: the part of the state that the basis shows."""
     size, last = V.shape[0], x.shape[1] - 1
     state, weighted = np.empty((size, 2)), np.empty((size, 2))
     for k in range(size):
@@ -244,7 +244,7 @@ def _project_state(mass: Array, V: Array, offset: Array, v: Array, x: Array, vx:
 
 
 def start_basis(model: Model, ws: Workspace, modes: int, iterations: int = 30) -> Array:
-    """Basis (n_free, modes + m) at the stable equilibrium that ``ws`` (K, U, G) belongs to.
+    """Return the basis (n_free, modes + m) at the stable equilibrium that ``ws`` (K, U, G) belongs to.
 
     Starts from a fixed pseudo-random block; 30 orthogonal iterations separate modes a factor 2 apart in
     frequency to 1e-18.

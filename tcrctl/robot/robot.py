@@ -49,7 +49,7 @@ class Robot:
     holes: Array | None = None
 
     def __deepcopy__(self, memo: dict[int, object]) -> Robot:
-        """Itself: nothing in it ever changes, and the kernels know its arrays as read-only."""
+        """Return itself: nothing in it ever changes, and the kernels know its arrays as read-only."""
         del memo
         return self
 
@@ -124,7 +124,7 @@ def build_robot(description: RobotDescription) -> Robot:
 
 
 def hole_friction(friction: FrictionSettings, first_hole: NDArray[np.int64]) -> Array:
-    """Friction of every hole (n_holes, 3), read-only, columns as in ``elements.rubbing_cable``.
+    """Return the friction of every hole (n_holes, 3), read-only, columns as in ``elements.rubbing_cable``.
 
     Args:
         friction: Common to all holes, or with a coefficient per cable.

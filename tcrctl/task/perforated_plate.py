@@ -20,7 +20,7 @@ DEEPEST = 40  # halvings of a segment; it is below any tolerance then
 
 @njit(cache=True)
 def point_distance(u: float, v: float, w: float, half: Array, holes: Array) -> float:
-    """Distance of a point to a plate.
+    """Return the distance of a point to a plate.
 
     Args:
         u: First coordinate of the point in the plate's frame [m].
@@ -44,7 +44,7 @@ def point_distance(u: float, v: float, w: float, half: Array, holes: Array) -> f
 def segment_distance(
     start: Array, end: Array, half: Array, holes: Array, farthest: float, tolerance: float
 ) -> float:
-    """Distance of a segment to a plate, by branch and bound.
+    """Return the distance of a segment to a plate, by branch and bound.
 
     The distance to the plate changes along the segment by no more than the length gone. A part with half length r
     whose middle has the distance D holds nothing nearer than D - r: it is halved as long as that could matter.

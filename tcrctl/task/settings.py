@@ -166,7 +166,7 @@ class BoxSettings(Settings):
         return self
 
     def sides_mm(self, wall: Wall) -> tuple[float, float]:
-        """Both sides of a wall [mm], in the order of x, y, z."""
+        """Return both sides of a wall [mm], in the order of x, y, z."""
         across, _ = WALLS[wall]
         first, second = (size for axis, size in enumerate(self.size_mm) if axis != across)
         return first, second

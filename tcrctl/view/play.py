@@ -104,7 +104,7 @@ class Player:
         return self.state(did_seek=request.seek_time is not None, request_id=request.request_id)
 
     def state(self, *, did_seek: bool = False, request_id: str | None = None) -> Any:
-        """Playback state for the app."""
+        """Return the playback state for the app."""
         websocket = foxglove_sdk().websocket
         kind = "Ended" if self._ended else "Playing" if self._playing else "Paused"
         status = getattr(websocket.PlaybackStatus, kind)
@@ -169,7 +169,7 @@ class Player:
             self._sleep(min(left, _NAP_S))
 
     def _left(self, time_ns: int) -> float:
-        """Time until a message is due [s]."""
+        """Return the time until a message is due [s]."""
         if not self._playing:
             self._anchor = None
             return _NAP_S

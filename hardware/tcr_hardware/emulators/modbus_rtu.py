@@ -93,7 +93,7 @@ class RtuPort:
 
 
 def request_length(start: bytes) -> int:
-    """Length of a request from its first bytes; 0 while it is not known."""
+    """Return the length of a request from its first bytes; 0 while it is not known."""
     if len(start) < 2:
         return 0
     if start[1] in COUNTED:
@@ -103,7 +103,7 @@ def request_length(start: bytes) -> int:
 
 
 def crc(data: bytes) -> bytes:
-    """CRC-16 of Modbus, low byte first ([MSL06], section 6.2.2)."""
+    """Return the CRC-16 of Modbus, low byte first ([MSL06], section 6.2.2)."""
     remainder = 0xFFFF
     for byte in data:
         remainder ^= byte
@@ -129,7 +129,7 @@ def _terminals() -> tuple[Callable[[int], Any], type[Exception]]:
 
 
 def _pseudo_terminal() -> tuple[int, int]:
-    """Both ends of a raw pseudo-terminal: ours, and the client's, kept open so that clients may come and go."""
+    """Open a raw pseudo-terminal; return our end and the client's, kept open so that clients may come and go."""
     make_raw, _ = _terminals()
     ours, theirs = os.openpty()
     make_raw(theirs)

@@ -119,7 +119,7 @@ class MotiveEmulator:
             self.link.change_version(self.version, FLAGGED_FRAMES)
 
     def ticks(self, at: float) -> int:
-        """Server clock at a time of ``time.monotonic`` [s]."""
+        """Return the server's clock at a time of ``time.monotonic`` [s]."""
         return round((at + self._clock_offset) * (1.0 + self.settings.clock_drift) * CLOCK_HZ)
 
     def _begin(self, clock_offset: float) -> None:

@@ -51,14 +51,14 @@ def text(value: str) -> bytes:
 
 
 def sender(name: str, version: Version) -> bytes:
-    """Who we are; behind the name lies garbage, as in the real thing."""
+    """Encode who we are; behind the name lies garbage, as in the real thing."""
     return text(name).ljust(256, b"\xcd") + bytes((3, 1, 0, 0)) + bytes((*version, 0, 0))
 
 
 def server_info(
     name: str, version: Version, clock_hz: int, data_port: int, multicast: bool, group: str
 ) -> bytes:
-    """Payload of SERVERINFO."""
+    """Encode the payload of SERVERINFO."""
     if version < (3, 0):
         return sender(name, version)
     address = bytes(int(part) for part in group.split("."))
@@ -66,7 +66,7 @@ def server_info(
 
 
 def _section(version: Version, count: int, content: bytes = b"") -> bytes:
-    """Count, from 4.1 size, and elements."""
+    """Encode count, from 4.1 size, and elements."""
     if version >= (4, 1):
         return struct.pack("<ii", count, len(content)) + content
     return struct.pack("<i", count) + content
@@ -132,7 +132,7 @@ def _suffix(version: Version, stamp: Stamp) -> bytes:
 
 
 def frame(version: Version, stamp: Stamp, tracked: TrackedMarkers, view: View) -> bytes:
-    """Payload of FRAMEOFDATA."""
+    """Encode the payload of FRAMEOFDATA."""
     out = [
         struct.pack("<i", stamp.number),
         _sets(version, tracked, view),
@@ -151,7 +151,7 @@ def frame(version: Version, stamp: Stamp, tracked: TrackedMarkers, view: View) -
 
 
 def models(version: Version, tracked: TrackedMarkers) -> bytes:
-    """Payload of MODELDEF: a marker set and a rigid body for every body, the set of all, one camera from 3.0 on."""
+    """Encode MODELDEF: a marker set and a rigid body for every body, the set of all, one camera from 3.0 on."""
     out = []
     for body in tracked.bodies:
         out.append((0, _set_description(body.name, body.markers)))

@@ -115,7 +115,7 @@ class TrackedMarkers:
         return mask
 
     def _unlabelled(self, points: NDArray[np.float64]) -> View:
-        """Nothing is recognised: points in an order of their own."""
+        """Recognise nothing: return points in an order of their own."""
         n, b = len(points), len(self.bodies)
         ids = FIRST_POINT_CLOUD_ID + np.arange(n)
         upright = np.tile([0.0, 0.0, 0.0, 1.0], (b, 1))
@@ -125,7 +125,7 @@ class TrackedMarkers:
         )
 
     def _orientations(self, seen: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rotation of every body against its definition, from its first three markers."""
+        """Return the rotation of every body against its definition, from its first three markers."""
         out = np.tile([0.0, 0.0, 0.0, 1.0], (len(self.bodies), 1))
         turned = _triads(seen[self._corners]) @ self._axes.transpose(0, 2, 1)
         known = np.isfinite(turned).all(axis=(1, 2))
@@ -135,7 +135,7 @@ class TrackedMarkers:
 
 
 def _triads(corners: NDArray[Any]) -> NDArray[np.float64]:
-    """Orthonormal axes (b, 3, 3), as columns, fixed to triples of markers (b, 3, 3); NaN if they are on a line."""
+    """Return orthonormal axes (b, 3, 3) as columns, fixed to triples of markers (b, 3, 3); NaN if on a line."""
     x, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     z = _cross(x, across)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -145,6 +145,6 @@ def _triads(corners: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
-    """Row-wise cross product; for a few rows ten times as fast as ``np.cross``."""
+    """Return row-wise cross products; for a few rows ten times as fast as ``np.cross``."""
     (ax, ay, az), (bx, by, bz) = a.T, b.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)

@@ -37,7 +37,7 @@ class Server(Protocol):
     link: MotiveLink
 
     def ticks(self, at: float) -> int:
-        """Server clock at a time of ``time.monotonic`` [s]."""
+        """Return the server's clock at a time of ``time.monotonic`` [s]."""
         ...
 
     def latest(self, version: Version) -> bytes:
@@ -46,7 +46,7 @@ class Server(Protocol):
 
 
 def answer(server: Server, datagram: bytes, address: tuple[str, int]) -> list[bytes]:
-    """Answers to one request, possibly none."""
+    """Return the answers to one request, possibly none."""
     if len(datagram) < 4:
         return []
     message = int.from_bytes(datagram[:2], "little")

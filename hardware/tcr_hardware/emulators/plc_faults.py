@@ -117,11 +117,11 @@ class PlcFaults:
             self._on_change(known, False)
 
     def get(self, name: str) -> dict[str, float | None] | None:
-        """Arguments of a fault if it is set."""
+        """Return the arguments of a fault if it is set."""
         return self._active.get(name)
 
     def take(self, name: str) -> dict[str, float | None] | None:
-        """Arguments of a fault if it is set; one answer less is left of a fault with a ``count``."""
+        """Return a fault's arguments if it is set, and use up one answer of one with a ``count``."""
         with self._lock:
             arguments = self._active.get(name)
             if arguments is None:

@@ -74,7 +74,7 @@ class PlcImage:
         self._command[start : start + len(words)] = words
 
     def command(self) -> dict[str, list[float]]:
-        """Values of the command registers by name, as the program reads them."""
+        """Return the values of the command registers by name, as the program reads them."""
         return {row.name: self._decode(row) for row in self._map.block("command")}
 
     def _block(self, block: str) -> dict[int, int]:
@@ -89,7 +89,7 @@ class PlcImage:
         return words
 
     def _with_faults(self, values: Values) -> Values:
-        """Values as the faults distort them."""
+        """Return the values as the faults distort them."""
         shown = dict(values)
         for fault, name in (("freeze_ack", "SEQ_ACK"), ("freeze_heartbeat", "HB_ECHO")):
             if name in shown and self._faults.get(fault) is not None:

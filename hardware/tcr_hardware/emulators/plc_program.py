@@ -114,11 +114,11 @@ class PlcProgram:
         self._target, self._speed, self._time_left_s = list(self.active), [0.0] * len(self.servos), 0.0
 
     def positions(self) -> list[float]:
-        """Positions reported (axes,), since tension zero [um]."""
+        """Return the positions reported (axes,), since tension zero [um]."""
         return [servo.position - origin for servo, origin in zip(self.servos, self._origin, strict=True)]
 
     def status(self) -> Status:
-        """Status bits."""
+        """Return the status bits."""
         at_rest = all(
             abs(active - at) <= IN_POSITION_UM
             for active, at in zip(self.active, self.positions(), strict=True)
@@ -140,7 +140,7 @@ class PlcProgram:
         return Status(sum(bit for bit, is_set in bits if is_set))
 
     def scan(self, command: PlcCommand, dt: float) -> None:
-        """One cycle of the program, ``dt`` [s] after the last."""
+        """Do one cycle of the program, ``dt`` [s] after the last."""
         self.cycle = (self.cycle + 1) & 0xFFFF
         rising = command.control & ~self._control
         self._control = command.control
@@ -159,12 +159,12 @@ class PlcProgram:
         self.coast(dt)
 
     def coast(self, dt: float) -> None:
-        """Time passes for the drives alone: they follow their last set-points, also while the program hangs."""
+        """Let time pass for the drives alone: they follow their last set-points, also while the program hangs."""
         for servo, active, origin in zip(self.servos, self.active, self._origin, strict=True):
             servo.advance(active + origin, dt)
 
     def _watch(self, command: PlcCommand, dt: float) -> None:
-        """Watchdog: the host has to change HEARTBEAT while operation is enabled."""
+        """Watch that the host changes HEARTBEAT while operation is enabled."""
         alive = command.heartbeat != self.heartbeat_echo
         self.heartbeat_echo = command.heartbeat
         self._silence_s = 0.0 if alive else self._silence_s + dt
@@ -173,7 +173,7 @@ class PlcProgram:
             self._trip(FaultCode.WATCHDOG)
 
     def _find_faults(self) -> None:
-        """Faults of the machine itself."""
+        """Look for faults of the machine itself."""
         if self.estop:
             self._trip(FaultCode.ESTOP)
         if self.drive_lost:
@@ -209,7 +209,7 @@ class PlcProgram:
         self._target, self.zeroed = list(self.active), True
 
     def _ready(self) -> bool:
-        """Whether an ENABLE edge would be obeyed, given RUN."""
+        """Tell whether an ENABLE edge would be obeyed, given RUN."""
         return self.fault is FaultCode.NONE and self.zeroed and not self.stopping
 
     def _permit(self, command: PlcCommand, rising: Control) -> None:
@@ -238,7 +238,7 @@ class PlcProgram:
         self._since_set_s = 0.0
 
     def _verdict(self, command: PlcCommand) -> tuple[Reject, int]:
-        """Whether a set may be taken; without FOLLOW its set-points do not matter."""
+        """Tell whether a set may be taken; without FOLLOW its set-points do not matter."""
         if Control.FOLLOW not in command.control:
             return Reject.NONE, 0
         if self.estop:
@@ -285,7 +285,7 @@ class PlcProgram:
         self.stopping = self.stopping and self._moving()
 
     def _moving(self) -> bool:
-        """Whether a set-point of the drives moves."""
+        """Tell whether a set-point of the drives moves."""
         return any(self._speed)
 
 

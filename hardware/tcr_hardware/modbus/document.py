@@ -109,7 +109,7 @@ def register_map_markdown(rows: RegisterMap) -> str:
 
 
 def _row(row: Register) -> tuple[str, ...]:
-    """One quantity as a row of a table."""
+    """Write one quantity as a row of a table."""
     address = f"{row.address}" if row.words == 1 else f"{row.address} .. {row.end - 1}"
     kind = row.kind if row.count == 1 else f"{row.count} x {row.kind}"
     unit = row.unit if row.scale == 1.0 or not row.unit else f"{row.scale:g} {row.unit}"

@@ -136,7 +136,7 @@ class RegisterMap:
         return tuple(register for register in self.registers if register.block == name)
 
     def span(self, name: str) -> tuple[int, int]:
-        """First address of a block and number of registers from there to its end."""
+        """Return the first address of a block and number of registers from there to its end."""
         block = self.block(name)
         first = min(register.address for register in block)
         return first, max(register.end for register in block) - first

@@ -134,7 +134,7 @@ class MocapFrame:
     suffix: Suffix
 
     def has(self, flag: int) -> bool:
-        """Whether the server set a flag of the frame, for instance ``MODELS_CHANGED``."""
+        """Tell whether the server set a flag of the frame, for instance ``MODELS_CHANGED``."""
         return bool(self.suffix.params & flag)
 
 

@@ -76,7 +76,7 @@ class Layout:
 
 @lru_cache(maxsize=32)
 def layout_of(version: Version) -> Layout:
-    """Layout of a version; for versions after ``NEWEST`` that of ``NEWEST`` with longer elements and sections."""
+    """Return a version's layout; after ``NEWEST`` that of ``NEWEST`` with longer elements and sections."""
     marker = MARKER if version >= (3, 0) else _MARKER_26 if version >= (2, 6) else _MARKER_25
     return Layout(
         sized=version >= (4, 1),
@@ -178,14 +178,14 @@ def _rigid_body_section(reader: Reader, layout: Layout) -> tuple[Records, tuple[
 
 
 def _rigid_bodies(reader: Reader, layout: Layout) -> Records:
-    """Bodies within a skeleton or asset."""
+    """Read the bodies within a skeleton or asset."""
     if layout.packed_bodies:
         return reader.array(RIGID_BODY, reader.count("rigid bodies", RIGID_BODY.itemsize))
     return _bodies_with_markers(reader, layout)[0]
 
 
 def _bodies_with_markers(reader: Reader, layout: Layout) -> tuple[Records, tuple[BodyMarkers, ...]]:
-    """Rigid bodies before 3.0: each carries its markers."""
+    """Read rigid bodies before 3.0: each carries its markers."""
     count = reader.items("rigid bodies", _BODY.size + 8)
     packed = bytearray(count * RIGID_BODY.itemsize)
     markers = []
@@ -217,7 +217,7 @@ def _analog(reader: Reader, layout: Layout) -> Analog:
 
 
 def _widened(markers: Records) -> Records:
-    """Labelled markers of any version as ``MARKER``; what the version lacks is 0."""
+    """Read labelled markers of any version as ``MARKER``; what the version lacks is 0."""
     if markers.dtype is MARKER:
         return markers
     wide = records(MARKER, len(markers))

@@ -44,5 +44,5 @@ class MarkerFrame:
         return self.arrival - (self.software_latency or 0.0)
 
     def age(self, now: float | None = None) -> float:
-        """Time since ``taken_at`` [s]."""
+        """Return the time since ``taken_at`` [s]."""
         return (time.monotonic() if now is None else now) - self.taken_at

@@ -50,7 +50,7 @@ class Receiver:
             self._unreachable(error)
 
     def _run(self) -> None:
-        """Whatever ends the thread is told to the readers: a silent end would look like still markers."""
+        """Tell readers whatever ends the thread: a silent end would look like still markers."""
         try:
             with selectors.DefaultSelector() as selector:
                 self._loop(selector)

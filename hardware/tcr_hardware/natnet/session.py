@@ -102,7 +102,7 @@ class Session:
         return frame
 
     def due(self, now: float) -> list[bytes]:
-        """Datagrams to be sent to the server at ``now`` [s]."""
+        """Return the datagrams to be sent to the server at ``now`` [s]."""
         wanted: list[bytes] = []
         if self._timers.due("connect" if self.server is None else "silence", now) and self._lacks_frames(now):
             wanted.append(protocol.connect(self.choice.asked))
@@ -122,7 +122,7 @@ class Session:
         return wanted
 
     def next_due(self, now: float) -> float:
-        """Seconds until ``due`` may have something to send."""
+        """Return the seconds until ``due`` may have something to send."""
         return self._timers.until_next(now)
 
     def _lacks_frames(self, now: float) -> bool:
@@ -186,7 +186,7 @@ class Session:
         self._models_changing = flagged
 
     def _forget_models(self) -> None:
-        """Names may have changed: none is better than a wrong one."""
+        """Forget names that may have changed: none is better than a wrong one."""
         if self.models is not None:
             self.models = None
             self._timers.now_due("models")

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def cable_names(description: RobotDescription) -> tuple[str, ...]:
-    """Names of the cables in the order of the drives."""
+    """Return the names of the cables in the order of the drives."""
     from tcrctl.robot.description import cable_routes
 
     return tuple(route.name for route in cable_routes(description))

@@ -188,7 +188,7 @@ class ModbusDrives:
 
 
 def _axis_range(cable: CableDrive) -> tuple[int, int]:
-    """Soft limits as the axis counts them [um]."""
+    """Return the soft limits as the axis counts them [um]."""
     ends = (round(1e3 * cable.sign * cable.min_mm), round(1e3 * cable.sign * cable.max_mm))
     return min(ends), max(ends)
 

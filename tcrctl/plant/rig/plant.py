@@ -200,7 +200,7 @@ class RigPlant:
             raise self.supervisor.failure
 
     def position(self) -> Micrometres:
-        """Where the drives were when they answered last (m,) [um].
+        """Return where the drives were when they answered last (m,) [um].
 
         Raises:
             DeviceError: If they never did.

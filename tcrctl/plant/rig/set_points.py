@@ -115,7 +115,7 @@ class SetPoints:
         self._next_speed = self._speed
 
     def propose(self, speed: Array) -> tuple[Micrometres, tuple[Clamp, ...]]:
-        """Set-points for the coming period, and what had to be changed to stay inside the limits.
+        """Return set-points for the coming period, and what had to be changed to stay inside the limits.
 
         Args:
             speed: Wanted speeds (m,) [m/s].

@@ -131,7 +131,7 @@ class Supervisor:
         self._go(SafetyState.ZEROING, "info", "tension-zero asked for")
 
     def end_zeroing(self, cause: str) -> None:
-        """Zeroing is over."""
+        """Note that zeroing is over."""
         self._go(SafetyState.DISARMED, "info", cause)
 
     def run(self) -> None:
@@ -243,7 +243,7 @@ def _fault(status: DriveStatus | None, *, enabled: bool = True) -> str:
 
 
 def _doubt(health: Health, rules: Rules) -> str:
-    """Why the drives shall be held for now; empty if all is well."""
+    """Return why the drives shall be held for now; empty if all is well."""
     if health.trouble:
         return f"no answer of the drives: {health.trouble}"
     if health.age >= rules.stale:
@@ -258,7 +258,7 @@ def _refusal(status: DriveStatus) -> str:
 
 
 def _refusals(health: Health, rules: Rules) -> list[str]:
-    """Everything that stands against arming."""
+    """Return everything that stands against arming."""
     status, reasons = health.status, []
     if status is None or health.trouble:
         return [f"the drives do not answer {health.trouble}".strip()]
