@@ -273,7 +273,8 @@ def test_slider_curves_robot_and_keys_work_together_in_a_browser(page, tmp_path)
     assert said["theme"] == "dark"
     assert said["end"] == pytest.approx(end)
     assert said["playing"]
-    assert 0.05 < said["played"] < end  # began again from 0; how far it came depends on the computer
+    assert said["began"] < 0.5 * end  # again from 0
+    assert said["played"] > said["began"]  # how far it comes depends on the computer
 
 
 @in_browser

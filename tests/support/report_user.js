@@ -22,4 +22,5 @@ clock.set(2); robotView.draw(); note("moved", picture() !== first);
 document.getElementById("theme").click(); note("theme", document.documentElement.dataset.theme);
 document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "End", bubbles: true })); note("end", clock.t);
 document.body.dispatchEvent(new KeyboardEvent("keydown", { key: " ", bubbles: true })); note("playing", player.playing);
+note("began", clock.t);
 setTimeout(() => note("played", clock.t), 1000);
