@@ -48,7 +48,7 @@ CHANGES: dict[str, tuple[str, ...]] = {
 
 
 def cell(outcome: Outcome) -> str:
-    """Largest and rms error, largest angle; or when it was stopped."""
+    """Return the largest and rms error, largest angle; or when it was stopped."""
     if outcome.failure:
         return f"diverges after {outcome.measures.duration_s:.0f} s"
     text = f"{outcome.part('position_error_mm'):.2f} / {outcome.part('position_error_mm', 'rms'):.2f} mm"

@@ -63,7 +63,7 @@ def random_drives(random: np.random.Generator) -> Array:
 
 
 def random_pose(random: np.random.Generator, robot: Robot) -> WaypointSettings:
-    """A pose that the nominal robot takes at rest with all cables taut."""
+    """Draw a pose that the nominal robot takes at rest with all cables taut."""
     while True:
         drive = random_drives(random)
         try:
@@ -77,7 +77,7 @@ def random_pose(random: np.random.Generator, robot: Robot) -> WaypointSettings:
 
 
 def random_path(random: np.random.Generator, robot: Robot) -> WaypointsSettings:
-    """Waypoints and limits of the motion."""
+    """Return the waypoints and limits of the motion."""
     return WaypointsSettings(
         kind="waypoints",
         points=tuple(random_pose(random, robot) for _ in range(random.integers(2, 5))),

@@ -63,14 +63,14 @@ CASES: dict[str, tuple[str, ...]] = {
 
 
 def holds(outcome: Outcome) -> bool:
-    """Whether a cell meets the bar."""
+    """Tell whether a cell meets the bar."""
     angle = outcome.part("orientation_error_deg")
     good = outcome.part("position_error_mm") <= WORST_MM and angle <= WORST_DEG
     return good and not outcome.failure and outcome.measures.unconverged_steps == 0
 
 
 def cell(outcome: Outcome) -> str:
-    """Text of a cell: largest position error, largest angle, smallest tension, steps not converged."""
+    """Return text of a cell: largest position error, largest angle, smallest tension, steps not converged."""
     if outcome.failure:
         return f"[red]{outcome.failure}"
     text = (

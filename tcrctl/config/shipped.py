@@ -104,7 +104,7 @@ def find_rig(name_or_path: str, folder: Path | None = None) -> Path:
 
 
 def is_identification(name_or_path: str) -> bool:
-    """Whether a shipped name or a file is an identification; False if there is none or it cannot be read."""
+    """Tell whether a shipped name or a file is an identification; False if there is none or it cannot be read."""
     from tcrctl.config import strict_yaml
 
     if not is_path(name_or_path):

@@ -10,13 +10,13 @@ mean only 2/π asin(U / V) of its friction, with mean speed U and dither speed V
 The measure is the innovation: the measured end position against the one predicted a period before, averaged over a
 whole wave so that the dither's own trace is not in it. A robot without friction does what is predicted, whatever
 else is wrong with its model, so its drives are left in peace. [ADC94]
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -53,6 +53,18 @@ def signs(robot: Robot) -> Array:
     return best
 
 
+class Dithered(NamedTuple):
+    """What a dither does at one moment.
+
+    Attributes:
+        amplitude: Half of the travel to and fro [m].
+        place: Where it has moved the drives (m,) [m].
+    """
+
+    amplitude: float
+    place: Array
+
+
 class Dither:
     """Adaptive dither of one controller.
 
@@ -62,13 +74,16 @@ class Dither:
 
     def __init__(self, settings: DitherSettings | None, period: float, robot: Robot) -> None:
         """Take a ``dither:`` section, or None for none, the control period [s] and the robot."""
-        self._settings, self._period, self.runs = settings or DitherSettings(), period, settings is not None
+        self._settings = settings or DitherSettings()
+        self._period = period
+        self.runs = settings is not None
         self._half_wave = max(1, round(0.5 / (self._settings.frequency_hz * period)))  # periods
         self._step = (
             self._half_wave // 2
         )  # it begins halfway up, so that the mean of the first wave is zero too
         self._signs = signs(robot) if self.runs else np.zeros(robot.n_cables)
-        self._sizes = np.array([self._settings.least_mm / 1e3 if self.runs else 0.0, 0.0])
+        self._sizes = np.array([_start(self._settings) if self.runs else 0.0, 0.0])
+        self._woken = False
         self._place = np.zeros(robot.n_cables)
         self._expects, self._expected = False, np.zeros(3)
         self._errors = np.zeros((2 * self._half_wave, 3))
@@ -78,6 +93,11 @@ class Dither:
     def amplitude(self) -> float:
         """Half of the travel to and fro [m]."""
         return float(self._sizes[0])
+
+    @property
+    def now(self) -> Dithered:
+        """Amplitude, and where the drives are in the wave."""
+        return Dithered(self.amplitude, self._place.copy())
 
     @property
     def innovation(self) -> float:
@@ -117,7 +137,9 @@ class Dither:
         amplitude, innovation = self._sizes
         innovation += self._blend * (min(size, s.outlier_mm / 1e3) - innovation)
         excess = innovation - s.threshold_mm / 1e3
-        rate = s.growth_1_s * excess if excess > 0.0 else -amplitude / s.release_s
+        self._woken = self._woken or excess > 0.0
+        decay = s.release_s if self._woken else s.settle_s
+        rate = s.growth_1_s * excess if excess > 0.0 else -amplitude / decay
         grown = min(max(amplitude + self._period * rate, s.least_mm / 1e3), s.most_mm / 1e3)
         self._sizes[:] = grown, innovation
 
@@ -137,3 +159,8 @@ class Dither:
         moved = wanted - self._place
         self._place[:] = wanted
         return np.asarray(moved / self._period)
+
+
+def _start(settings: DitherSettings) -> float:
+    """Return the amplitude at the start [m]."""
+    return max(settings.least_mm, min(settings.start_mm, settings.most_mm)) / 1e3

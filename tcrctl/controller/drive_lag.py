@@ -1,12 +1,12 @@
 """What the lag and the dead time of the drives make of a prediction.
 
-A drive follows its set-point s(t - θ) with a position loop of time constant τ. So the answer R to a unit ramp of the
-cable becomes R_L(t - θ), R_L' = (R - R_L) / τ, and what is on its way already moves the robot by
+A drive follows its set-point s(t - θ) with a position loop of time constant τ. So the answer R to a unit ramp of
+the cable becomes R_L(t - θ), R_L' = (R - R_L) / τ, and what is on its way already moves the robot by
 
     p (R - R_L) / τ  +  w (R_L(t) - R_L(t - θ)) / θ
 
-with p the set-point of a dead time ago minus the cable taken in, and w what was sent since, spread evenly. R is taken
-for straight between instants.
+with p the set-point of a dead time ago minus the cable taken in, and w what was sent since, spread evenly. R is
+taken for straight between instants.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
 from numba import njit
 
 from tcrctl.signals import Array
@@ -48,7 +47,7 @@ def _follow(change: Array, step: float, lag: float, out: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _late(values: Array, n: int, r: int, c: int, steps: float) -> float:
-    """The value ``steps`` instants before instant n, between them; 0 before the first."""
+    """Interpolate the value ``steps`` instants before instant n; 0 before the first."""
     at = n + 1 - steps
     if at <= 0.0:
         return 0.0

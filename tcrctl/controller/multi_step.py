@@ -22,17 +22,17 @@ from numba import njit
 
 from tcrctl.controller.blocks import Grid, make_grid, superpose
 from tcrctl.controller.drive_lag import DriveLag, with_lag
-from tcrctl.controller.settings import KnownDrives
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
+from tcrctl.controller.plan import Situation
 from tcrctl.controller.prediction_settings import MultiStepSettings
-from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning
+from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning, present
 from tcrctl.controller.tension_gap import TensionGap
 from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, pose, response
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
-from tcrctl.robot.hole_drag import HoleDrag, drag_force, fill_hole_drag, no_drag
+from tcrctl.robot.hole_drag import HoleDrag, drag_force, fill_hole_drag, no_drag, turn
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
 from tcrctl.robot.potential import Outcome, minimise
@@ -40,21 +40,17 @@ from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot, hole_friction
 from tcrctl.robot.sections import FrictionSettings
 from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, StaticMap, follow, rest_map
-from tcrctl.signals import Array, Estimate
+from tcrctl.signals import Array
 
 
-import os
-RET = os.environ.get('RET','1')=='1'
-TURN = float(os.environ.get('TURN', '0.04'))
-
-class Memory(NamedTuple):
+class MultiStepMemory(NamedTuple):
     """What the predictor keeps from step to step, changed in place.
 
     Attributes:
         at: Where the model is at rest.
         offset: Δ (3 n_nodes,) [m].
         v: Velocities of the last estimate (3 n_nodes,) [m/s].
-        basis: Basis of the response (12 n_modules, modes + m).
+        basis: Basis of the response (n_free, modes + m).
         drag: Drag of the dithered holes.
         friction: Their friction (n_holes, 3), columns as in ``elements.rubbing_cable``.
     """
@@ -69,10 +65,15 @@ class Memory(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _update_offset(
-    model: Model, ws: Workspace, memory: Memory, deviation: Array, now: Now, period: float, blend: float
+    model: Model,
+    ws: Workspace,
+    memory: MultiStepMemory,
+    deviation: Array,
+    now: Now,
+    tuning: Tuning,
 ) -> None:
-    """Filter the displacement of the point that the robot vibrates about: δ + K^-1 M (a + α v)."""
-    force, lag, v = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0]), now.v
+    """Filter the displacement of the point that the robot vibrates about: δ + K^-1 (M (a + α v) - drag)."""
+    force, lag, v, period = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0]), now.v, tuning.period
     drag_force(model, memory.drag, v, now.speed, force)
     for k in range(force.shape[0]):
         force[k] = -force[k]
@@ -84,12 +85,19 @@ def _update_offset(
     linear.solve(ws, force, lag)
     for k in range(force.shape[0]):
         j = 3 * FIXED + k
-        memory.offset[j] += blend * (deviation[j] + lag[k] - memory.offset[j])
+        memory.offset[j] += tuning.blend * (deviation[j] + lag[k] - memory.offset[j])
 
 
 @njit(cache=True, error_model="numpy")
 def forecast(
-    model: Model, load: Load, ws: Workspace, memory: Memory, now: Now, grid: Grid, tip: int, tuning: Tuning
+    model: Model,
+    load: Load,
+    ws: Workspace,
+    memory: MultiStepMemory,
+    now: Now,
+    grid: Grid,
+    tip: int,
+    tuning: Tuning,
 ) -> tuple[Outcome, bool, Array, Array]:
     """Make one prediction as in the module's docstring, in one kernel.
 
@@ -108,18 +116,22 @@ def forecast(
     """
     at, q, v = memory.at, now.q, now.v
     outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
-    deviation, away, finite = np.empty(q.shape[0]), np.empty(q.shape[0]), True
+    deviation = np.empty(q.shape[0])
+    away = np.empty(q.shape[0])
+    finite = True
     for k in range(q.shape[0]):
         deviation[k] = q[k] - at.equilibrium[k]
         finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
-    fill_hole_drag(model, at.equilibrium, ws.G, ws.tension, memory.friction, tuning.turn, memory.drag)
+    fill_hole_drag(model, at.equilibrium, ws, memory.friction, tuning.turn, memory.drag)
     if outcome.converged and tuning.blend > 0.0 and finite:
-        _update_offset(model, ws, memory, deviation, now, tuning.period, tuning.blend)
+        _update_offset(model, ws, memory, deviation, now, tuning)
     for k in range(q.shape[0]):
         memory.v[k] = v[k]
         away[k] = deviation[k] - memory.offset[k]
     release = response.Release(away, v)
-    change, stable = response.respond(model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis, memory.drag)
+    change, stable = response.respond(
+        model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis, memory.drag
+    )
     with_lag(change, grid.ahead[0], tuning.drives, now.behind, now.queue)
     free, gain = superpose(change, now.outputs, grid.edges)
     return outcome, stable, free, gain
@@ -128,17 +140,21 @@ def forecast(
 class MultiStep:
     """See the module's docstring."""
 
-    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, drives: KnownDrives) -> None:
-        """Take a ``prediction:`` section, the control period [s] and the robot."""
+    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, drives: DriveLag) -> None:
+        """Take a ``prediction:`` section, the control period [s], the robot and its drives."""
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
-        self._tuning = make_tuning(period, settings.filter_s)._replace(drives=DriveLag(drives.lag_s, drives.dead_time_s))
-        self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
+        self._tuning = make_tuning(period, settings.filter_s)._replace(drives=drives)
+        self._turn = settings.turn_s
+        self._work = make_workspace(robot.model)
+        self._load = static_load(robot.model, robot.weight)
         at, still = rest_map(robot), np.zeros_like(robot.rest.q)
         q, drive = robot.rest.q.copy(), np.zeros(robot.n_cables)
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         basis = response.start_basis(robot.model, self._work, settings.modes)
-        self._memory = Memory(at, still, still.copy(), basis, no_drag(robot.model), hole_friction(FrictionSettings(), robot.model.first_hole))
+        self._memory = MultiStepMemory(
+            at, still, still.copy(), basis, no_drag(robot.model), _friction(settings, robot)
+        )
         self._solved = False
         self._fresh = settings.offset is not None and settings.offset.from_start
         self._gap = TensionGap(settings.tension_gap, period, robot.n_cables)
@@ -167,11 +183,11 @@ class MultiStep:
         what, at = "Newton on the statics; one LCP after it, not fed back", self._memory.at
         return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
-    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array, shaken: float = 0.0, place: Array = 0.0) -> Forecast:
+    def predict(self, at: Situation) -> Forecast:
         """See :class:`Predictor`."""
-        robot, memory = self._robot, self._memory
-        now = Now(estimate.q + age * estimate.v, estimate.v, estimate.drive, outputs, speed, estimate.arrived - (place if RET else 0.0) - estimate.drive, estimate.set_point - estimate.arrived)
-        tuning = self._tuning._replace(turn=TURN * shaken / (shaken**2 + 0.5e-3**2))
+        robot, memory, estimate = self._robot, self._memory, at.estimate
+        now = present(at)
+        tuning = self._tuning._replace(turn=turn(self._turn, at.dither.amplitude))
         if self._fresh:  # the robot rests: all of its deviation is offset
             memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0)
         outcome, stable, free, gain = forecast(
@@ -186,3 +202,10 @@ class MultiStep:
         if self._feedforward:
             at_rest = pose.drive_gain(memory.at.equilibrium, memory.at.gain, robot.tip)[:6]
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)
+
+
+def _friction(settings: MultiStepSettings, robot: Robot) -> Array:
+    """Return the friction of every hole (n_holes, 3): as the robot file says it, or as usual."""
+    if robot.holes is not None:
+        return robot.holes
+    return hole_friction(FrictionSettings(), robot.model.first_hole)

@@ -11,8 +11,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from tcrctl.controller.blocks import make_grid
+from tcrctl.controller.drive_lag import DriveLag
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
+from tcrctl.controller.plan import Situation
 from tcrctl.controller.prediction_settings import OneStepSettings
 from tcrctl.controller.predictor import Forecast
 from tcrctl.memory import Kept
@@ -23,7 +25,7 @@ from tcrctl.robot.potential import minimise
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
 from tcrctl.robot.statics import SHARP, TOLERANCE
-from tcrctl.signals import Array, Estimate
+from tcrctl.signals import Array
 
 MAX_ITERATIONS = 60
 
@@ -31,12 +33,14 @@ MAX_ITERATIONS = 60
 class OneStep:
     """See the module's docstring."""
 
-    def __init__(self, settings: OneStepSettings, period: float, robot: Robot, drives: object = None) -> None:
+    def __init__(self, settings: OneStepSettings, period: float, robot: Robot, drives: DriveLag) -> None:
         """Take a ``prediction:`` section and the robot; the control ``period`` [s] does not matter."""
         del period
+        del drives  # it predicts what the cables do
         self._robot, self._horizon = robot, settings.horizon_s
         self.grid = make_grid(1, 1, settings.horizon_s)
-        self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
+        self._work = make_workspace(robot.model)
+        self._scratch = dynamics.make_scratch(robot.model)
         self._gain = np.zeros((self._work.r.shape[0], robot.n_cables))
         self._column = np.zeros(self._work.r.shape[0])
         self._tolerance = TOLERANCE
@@ -58,18 +62,19 @@ class OneStep:
 
     def _load(self, q: Array, v: Array, drive: Array) -> Load:
         """Return the load of backward Euler over the horizon from (q, v, d)."""
-        step, s = self._horizon, self._scratch
-        inertia = 1.0 / step**2 + self._robot.model.damping / step
-        s.nodal[Q_FREE] = q + v / (step * inertia)
+        horizon, s = self._horizon, self._scratch
+        inertia = 1.0 / horizon**2 + self._robot.model.damping / horizon
+        s.nodal[Q_FREE] = q + v / (horizon * inertia)
         s.nodal[FORCE] = self._robot.weight
         dynamics.lengths_before(self._robot.model, q, v, drive, np.zeros_like(drive), 0.0, s, self._work)
-        return Load(inertia, 1.0 / step, s.nodal, s.bar_before, s.cable_before, None)
+        return Load(inertia, 1.0 / horizon, s.nodal, s.bar_before, s.cable_before, None)
 
-    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array, shaken: float = 0.0, place: object = None) -> Forecast:
-        """See :class:`Predictor`."""
-        del outputs  # the step predicts outputs from the state itself
-        horizon, m, tip = self._horizon, speed.shape[0], self._robot.tip
-        load = self._load(estimate.q + age * estimate.v, estimate.v, estimate.drive)
+    def predict(self, at: Situation) -> Forecast:
+        """See :class:`Predictor`. The step predicts outputs from the state itself."""
+        estimate, speed, horizon = at.estimate, at.previous, self._horizon
+        m = speed.shape[0]
+        tip = self._robot.tip
+        load = self._load(estimate.q + at.age * estimate.v, estimate.v, estimate.drive)
         q = self._guess.copy()
         drive = estimate.drive + horizon * speed
         outcome = minimise(

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from tcrctl.controller.dither import Dithered
 from tcrctl.controller.inner_map import Linearisable
 from tcrctl.signals import Array, Estimate, Reference
 
@@ -26,6 +27,7 @@ class Situation:
         low: Lower limits of the inputs of all blocks (blocks * m,) [m/s].
         high: Upper limits (blocks * m,) [m/s].
         doubt: Empty, or why the estimate is not usable: whatever is planned, the drives will be held.
+        dither: What the dither does.
     """
 
     estimate: Estimate
@@ -38,8 +40,7 @@ class Situation:
     low: Array
     high: Array
     doubt: str
-    shaken: float = 0.0
-    place: Array | None = None
+    dither: Dithered
 
     def within(self, speed: Array) -> Array:
         """Return speeds of the coming period (m,) [m/s], each cut off at its limits."""

@@ -32,6 +32,12 @@ class TensionGapSettings(Settings):
     filter_s: float = quantity("s", "time constant after which a difference counts as lasting", 1.0, gt=0)
 
 
+class HoleDragSettings(Settings):
+    """Cables that a dither keeps sliding feel a drag; friction as in the robot file, else as usual."""
+
+    turn_s: float = quantity("s", "time that the friction needs for a turn of the dither", 0.1, gt=0)
+
+
 class MultiStepSettings(Settings):
     """Linear response over the horizon, or with ``model: static`` the static answer to the drives."""
 
@@ -49,6 +55,10 @@ class MultiStepSettings(Settings):
         default=TensionGapSettings(),
         description="lasting differences of tension, left out, or off; model: dynamic only",
     )
+    hole_drag: OrOff[HoleDragSettings] = Field(
+        default=HoleDragSettings(),
+        description="what is left of the friction of dithered cables, or off; model: dynamic only",
+    )
     feedforward: bool = Field(
         default=True,
         description="changes of drive speed are weighed against those that the reference needs, not against none",
@@ -59,9 +69,16 @@ class MultiStepSettings(Settings):
         """Time constant of the offset [s]; None if it is off."""
         return None if self.offset is None else self.offset.filter_s
 
+    @property
+    def turn_s(self) -> float:
+        """Time of a turn [s]; 0 if drag is off."""
+        return 0.0 if self.hole_drag is None else self.hole_drag.turn_s
+
     def misfits(self, period_s: float, model: str) -> Iterator[Finding]:
         """Yield path and message of what does not go with a control period [s] and a model."""
         yield from _too_short(self.horizon_s, period_s)
+        if model == "static" and self.hole_drag != HoleDragSettings():
+            yield ("hole_drag",), "has no meaning with model: static; leave it out"
         if model == "static" and self.modes != MODES:
             yield ("modes",), "has no meaning with model: static; leave it out"
         if model == "static" and self.tension_gap != TensionGapSettings():

@@ -11,8 +11,9 @@ from tcrctl.controller.blocks import Grid
 from tcrctl.controller.drive_lag import DriveLag
 from tcrctl.controller.inner_map import Linearisable
 from tcrctl.controller.ioc import Prediction
+from tcrctl.controller.plan import Situation
 from tcrctl.robot.statics import SHARP, TOLERANCE
-from tcrctl.signals import Array, Estimate
+from tcrctl.signals import Array
 
 
 class Now(NamedTuple):
@@ -23,6 +24,9 @@ class Now(NamedTuple):
         v: Node velocities (3 n_nodes,) [m/s].
         drive: Drive lengths d (m,) [m].
         outputs: Outputs as they should be now (7 + m,).
+        speed: The last input (m,) [m/s].
+        behind: What the drives have arrived at, without dither, minus where they are (m,) [m].
+        queue: What was sent since (m,) [m].
     """
 
     q: Array
@@ -41,6 +45,8 @@ class Tuning(NamedTuple):
         period: Control period [s].
         blend: Part of the way that the offset Δ goes in one step; 0 keeps it.
         tolerance: Largest nodal force left in the equilibrium [N].
+        turn: Time of a turn of the friction over the amplitude of the dither [s/m], see robot.hole_drag.
+        drives: Their lag.
     """
 
     period: float
@@ -89,13 +95,16 @@ class Predictor(Linearisable, Protocol):
 
     grid: Grid
 
-    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array) -> Forecast:
-        """Predict from an estimate that is ``age`` [s] old.
-
-        Args:
-            estimate: The state.
-            age: Its age [s].
-            outputs: Outputs (7 + m,) as they should be now.
-            speed: The last input (m,) [m/s].
-        """
+    def predict(self, at: Situation) -> Forecast:
+        """Predict from one control step, as far as it is known."""
         ...
+
+
+def present(at: Situation) -> Now:
+    """Return what a kernel is told of a control step.
+
+    The dither is counted as if it ended now: what it has moved comes back, and the prediction is one of the mean.
+    """
+    x = at.estimate
+    behind = x.arrived - at.dither.place - x.drive
+    return Now(x.q + at.age * x.v, x.v, x.drive, at.outputs, at.previous, behind, x.set_point - x.arrived)

@@ -68,6 +68,16 @@ class DitherSettings(Settings):
     release_s: float = quantity("s", "time constant of its decay", 100.0, gt=0)
     filter_s: float = quantity("s", "time constant of the innovation's size", 0.2, gt=0)
     outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
+    start_mm: float = quantity("mm", "amplitude at the start, before anything is known", 0.0, ge=0, le=5)
+    settle_s: float = quantity(
+        "s", "time constant of its decay until the threshold is passed for the first time", 1.5, gt=0
+    )
+    speed_change: float = quantity(
+        "s2/m2",
+        "weight of squared changes of drive speed while it runs, if that is the larger one",
+        6.0e3,
+        gt=0,
+    )
 
     @model_validator(mode="after")
     def _in_order(self) -> DitherSettings:
@@ -99,6 +109,11 @@ class ControllerSection(Settings):
     def tracks(self) -> Literal["position", "pose"] | None:
         """What of the end is fed back; None if nothing is."""
         return None
+
+    @property
+    def known_drives(self) -> KnownDrives:
+        """What is known of the drives."""
+        return KnownDrives()
 
     @property
     def floor_n(self) -> float | None:
@@ -157,6 +172,11 @@ class IocSettings(ControllerSection):
                     yield ("weights", key), "has no meaning with output: position; must be 0"
         elif self.weights.normal == 0:
             yield ("weights", "normal"), "must be > 0 with output: pose, or the normal is not tracked"
+
+    @property
+    def known_drives(self) -> KnownDrives:
+        """What is known of the drives."""
+        return self.drives
 
     @property
     def tracks(self) -> Literal["position", "pose"]:
@@ -218,6 +238,12 @@ ControllerSettings: TypeAlias = Annotated[
     IocSettings | KinematicSettings | OpenLoopSettings, Field(discriminator="kind")
 ]
 """Union of all kinds of controller, told apart by ``kind``."""
+
+
+def shaken_speed_change(settings: IocSettings) -> float:
+    """Return the weight W while a dither runs [s2/m2]."""
+    calm = settings.weights.speed_change
+    return calm if settings.dither is None else max(calm, settings.dither.speed_change)
 
 
 def speed_limit(settings: ControllerSettings) -> float:

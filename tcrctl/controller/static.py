@@ -12,16 +12,19 @@ where the robot rests.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from tcrctl.controller.blocks import Grid, make_grid, superpose
+from tcrctl.controller.drive_lag import DriveLag
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
+from tcrctl.controller.plan import Situation
 from tcrctl.controller.prediction_settings import MultiStepSettings
-from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning
+from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning, present
 from tcrctl.memory import NORMAL, POSITION, TENSION, Kept
 from tcrctl.robot import pose
 from tcrctl.robot.equations import Load, Workspace, make_workspace
@@ -31,10 +34,10 @@ from tcrctl.robot.potential import Outcome
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
 from tcrctl.robot.statics import StaticMap, follow, rest_map, static_outputs
-from tcrctl.signals import Array, Estimate
+from tcrctl.signals import Array
 
 
-class Memory(NamedTuple):
+class StaticMemory(NamedTuple):
     """What the predictor keeps from step to step, changed in place.
 
     Attributes:
@@ -48,7 +51,14 @@ class Memory(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def forecast(
-    model: Model, load: Load, ws: Workspace, memory: Memory, now: Now, grid: Grid, tip: int, tuning: Tuning
+    model: Model,
+    load: Load,
+    ws: Workspace,
+    memory: StaticMemory,
+    now: Now,
+    grid: Grid,
+    tip: int,
+    tuning: Tuning,
 ) -> tuple[Outcome, Array, Array]:
     """Make one prediction as in the module's docstring, in one kernel.
 
@@ -65,7 +75,9 @@ def forecast(
     Returns:
         Outcome of the statics, free (n, 7 + m), gain (n, 7 + m, blocks * m).
     """
-    at, offset, blend = memory.at, memory.offset, tuning.blend
+    at = memory.at
+    offset = memory.offset
+    blend = tuning.blend
     outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
     rest, answer = static_outputs(model, ws, at, tip)
     if outcome.converged and blend > 0.0 and np.isfinite(now.outputs).all():
@@ -80,13 +92,15 @@ def forecast(
 class Static:
     """See the module's docstring."""
 
-    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, drives: object = None) -> None:
+    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, drives: DriveLag) -> None:
         """Take a ``prediction:`` section, the control period [s] and the robot."""
+        del drives  # at rest they have arrived
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
         self._tuning = make_tuning(period, settings.filter_s)
-        self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
-        self._memory = Memory(rest_map(robot), np.zeros(POSE_ROWS + robot.n_cables))
+        self._work = make_workspace(robot.model)
+        self._load = static_load(robot.model, robot.weight)
+        self._memory = StaticMemory(rest_map(robot), np.zeros(POSE_ROWS + robot.n_cables))
         self._solved = False
 
     def sharpen(self) -> None:
@@ -107,11 +121,10 @@ class Static:
         what, at = "Newton on the statics; one LCP after it, not fed back", self._memory.at
         return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
-    def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array, shaken: float = 0.0, place: object = None) -> Forecast:
-        """See :class:`Predictor`."""
-        del age, shaken  # at rest the past does not matter
+    def predict(self, at: Situation) -> Forecast:
+        """See :class:`Predictor`. At rest the past does not matter, nor does the age of the estimate."""
         robot, memory = self._robot, self._memory
-        now = Now(estimate.q, estimate.v, estimate.drive, outputs, speed, speed, speed)
+        now = present(replace(at, age=0.0))
         outcome, free, gain = forecast(
             robot.model, self._load, self._work, memory, now, self.grid, robot.tip, self._tuning
         )

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol
 
 from tcrctl.config.settings import Settings
-from tcrctl.estimator.drives import DriveBelief
-from tcrctl.estimator.exact import State, build_exact
+from tcrctl.estimator.drives import BelievedDrives
+from tcrctl.estimator.exact import TrueState, build_exact
 from tcrctl.estimator.passive_observer import build_observer
 from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
 from tcrctl.robot.robot import Robot
@@ -22,7 +22,7 @@ class Estimator(Protocol):
         ...
 
 
-Builder = Callable[[Any, Robot, float, State | None], Estimator]
+Builder = Callable[[Any, Robot, float, TrueState | None, BelievedDrives], Estimator]
 
 #: Section and builder of every ``estimator.kind``.
 KINDS: Final[Mapping[str, tuple[type[Settings], Builder]]] = {
@@ -32,7 +32,7 @@ KINDS: Final[Mapping[str, tuple[type[Settings], Builder]]] = {
 
 
 def build_estimator(
-    settings: EstimatorSettings, robot: Robot, period: float, state: State | None, drives: DriveBelief | None = None
+    settings: EstimatorSettings, robot: Robot, period: float, state: TrueState | None, drives: BelievedDrives
 ) -> Estimator:
     """Build the estimator of an ``estimator:`` section.
 
@@ -41,9 +41,10 @@ def build_estimator(
         robot: The robot that the controller knows.
         period: Control period [s].
         state: True positions and velocities of a simulated plant, None on a rig.
+        drives: Where the drives are believed to be; the estimator moves them on.
 
     Raises:
         InputError: If the exact state is asked for where there is none.
     """
     _, build = KINDS[settings.kind]
-    return build(settings, robot, period, state, drives or DriveBelief(0.0, 0.0, 'encoder', period))
+    return build(settings, robot, period, state, drives)

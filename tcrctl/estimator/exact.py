@@ -8,25 +8,26 @@ import numpy as np
 
 from tcrctl.elements import sliding_cable
 from tcrctl.errors import InputError
+from tcrctl.estimator.drives import BelievedDrives
 from tcrctl.estimator.settings import ExactSettings
-from tcrctl.estimator.drives import DriveBelief
 from tcrctl.memory import Kept
 from tcrctl.robot import pose
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, Estimate, Measurement
 
-State = Callable[[], tuple[Array, Array]]
+TrueState = Callable[[], tuple[Array, Array]]
+"""Returns positions and velocities (3 n_nodes,) each [m], [m/s]."""
 
 
 class ExactState:
     """Passes on what ``state`` returns: true positions and velocities (3 n_nodes,) each."""
 
-    def __init__(self, robot: Robot, state: State, drives: DriveBelief) -> None:
+    def __init__(self, robot: Robot, state: TrueState, drives: BelievedDrives) -> None:
         self._robot, self._state, self._drives = robot, state, drives
 
     def memory(self) -> Mapping[str, Kept]:
-        """Nothing: the plant remembers."""
-        return {}
+        """Return what is kept of the drives; the plant remembers all else."""
+        return self._drives.memory()
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Estimate without error; tensions are those of the controller's model in that shape."""
@@ -34,7 +35,8 @@ class ExactState:
         drive = self._drives.reached
         q, v = self._state()
         model, tip = self._robot.model, self._robot.tip
-        length, gradient = np.zeros(self._robot.n_cables), np.zeros((self._robot.n_cables, q.shape[0]))
+        length = np.zeros(self._robot.n_cables)
+        gradient = np.zeros((self._robot.n_cables, q.shape[0]))
         sliding_cable.path_gradients(
             q, model.first_hole, model.hole_nodes, model.hole_weights, model.cables, length, gradient
         )
@@ -54,7 +56,9 @@ class ExactState:
         )
 
 
-def build_exact(settings: ExactSettings, robot: Robot, period: float, state: State | None, drives: DriveBelief) -> ExactState:
+def build_exact(
+    settings: ExactSettings, robot: Robot, period: float, state: TrueState | None, drives: BelievedDrives
+) -> ExactState:
     """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`.
 
     Raises:

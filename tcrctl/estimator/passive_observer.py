@@ -23,8 +23,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tcrctl.estimator.drives import DriveBelief
-from tcrctl.estimator.exact import State
+from tcrctl.estimator.drives import BelievedDrives
+from tcrctl.estimator.exact import TrueState
 from tcrctl.estimator.lost_markers import LostMarkers
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.memory import NORMAL, POSITION, SPEED, Kept
@@ -45,8 +45,10 @@ FIT_ITERATIONS = 80
 class PassiveObserver:
     """See the module's docstring. State: positions, velocities, drives, correction of the end pose, last frame."""
 
-    def __init__(self, settings: PassiveObserverSettings, robot: Robot, period: float, drives: DriveBelief) -> None:
-        """Take an ``estimator:`` section, the robot and the control period [s]."""
+    def __init__(
+        self, settings: PassiveObserverSettings, robot: Robot, period: float, drives: BelievedDrives
+    ) -> None:
+        """Take an ``estimator:`` section, the robot, the control period [s] and the drives."""
         self._robot, self._period, self._drives = robot, period, drives
         self._stiffness = settings.stiffness_n_m
         self._blend = -float(np.expm1(-period / settings.pose_filter_s))
@@ -59,15 +61,19 @@ class PassiveObserver:
         self._correction = np.zeros(6)
         self._updates = 0
         self._fits, self._holds = settings.fit_start, settings.hold_blank
-        self._frame, self._frame_valid = np.zeros((rows.size, 3)), np.zeros(rows.size, dtype=np.bool_)
+        self._frame = np.zeros((rows.size, 3))
+        self._frame_valid = np.zeros(rows.size, dtype=np.bool_)
         self._lost = LostMarkers(rows.size, period)
-        self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
+        self._work = make_workspace(robot.model)
+        self._scratch = dynamics.make_scratch(robot.model)
         self._scratch.nodal[FORCE] = robot.weight
         self._valid, self._seen = np.zeros(rows.shape[0], dtype=np.bool_), self._coordinates[:0]
 
     def _load(self, measured: Measurement) -> Load:
-        """Inertia of backward Euler, weight and virtual springs of one update."""
-        period, s, model = self._period, self._scratch, self._robot.model
+        """Return the inertia of backward Euler, weight and virtual springs of one update."""
+        period = self._period
+        s = self._scratch
+        model = self._robot.model
         inertia = 1.0 / period**2 + model.damping / period
         s.nodal[Q_FREE] = self._q + self._v / (period * inertia)
         if not np.array_equal(measured.valid, self._valid):
@@ -98,9 +104,13 @@ class PassiveObserver:
         So the robot does not seem to jump there in a step. Without a solution the model stays at its own rest.
         """
         still = self._load(measured)._replace(inertia=0.0, w=0.0)
-        model, q, drive = self._robot.model, self._q.copy(), measured.drive.copy()
+        model = self._robot.model
+        q = self._q.copy()
+        drive = measured.drive.copy()
         if minimise(model, q, drive, still, self._work, TOLERANCE, FIT_ITERATIONS, False).converged:
-            self._q, self._v, self._drive = q, np.zeros_like(q), drive
+            self._q = q
+            self._v = np.zeros_like(q)
+            self._drive = drive
 
     def _correct(self, measured: Measurement) -> tuple[Array, Array]:
         """End position and normal, corrected by what the tip ring's markers say."""
@@ -125,11 +135,12 @@ class PassiveObserver:
             "drive": Kept(self._drive, POSITION),
             "correction_position": Kept(self._correction[:3], POSITION),
             "correction_normal": Kept(self._correction[3:], NORMAL),
+            **self._drives.memory(),
             **({"frame": Kept(self._frame.ravel(), POSITION)} if self._holds else {}),
         }
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
-        """Step the model to the time of ``measured``; the drives are those that it reports."""
+        """Step the model to the time of ``measured``."""
         self._drives.update(measured.drive, applied.drive)
         measured = replace(self._held(measured), drive=self._drives.reached)
         if self._fits and measured.valid.any():
@@ -162,7 +173,11 @@ class PassiveObserver:
 
 
 def build_observer(
-    settings: PassiveObserverSettings, robot: Robot, period: float, state: State | None, drives: DriveBelief
+    settings: PassiveObserverSettings,
+    robot: Robot,
+    period: float,
+    state: TrueState | None,
+    drives: BelievedDrives,
 ) -> PassiveObserver:
     """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`."""
     del state

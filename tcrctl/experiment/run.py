@@ -29,7 +29,7 @@ from tcrctl.experiment.run_folder import (
 )
 from tcrctl.experiment.summary import Summary, Verdict, judge
 from tcrctl.log.file_names import RESOLVED, SPEC
-from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.geometry import CableHoles, LogGeometry
 from tcrctl.log.mcap_file import Opening, Tap
 from tcrctl.log.writer import Flushing, LogWriter
 from tcrctl.loop.interruption import Interruption
@@ -38,7 +38,7 @@ from tcrctl.loop.pacing import Pace, RealTime, Unpaced
 from tcrctl.loop.quiet import quiet_interpreter
 from tcrctl.plant.plant import RunnablePlant
 from tcrctl.plant.rig.journal import Journal
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.robot.module import RIGID_BARS, module_of, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import StepRecord
@@ -89,7 +89,7 @@ def run_experiment(
     with Interruption() as interruption:
         pace = RealTime(experiment.period, interruption.check) if realtime else Unpaced(interruption.check)
         journal = Journal(pace.time, notify)
-        plant, state = build_plant(experiment, Session(pace.time, journal.report, confirmed))
+        plant, state = build_plant(experiment, Operation(pace.time, journal.report, confirmed))
         try:
             parts, start_offset = build_parts(experiment, plant, state)
             folder = make_run_folder(out, experiment.spec.name)
@@ -138,7 +138,7 @@ def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeome
     model, routes = robot.model, []
     for c, name in enumerate(robot.cable_names):
         holes = slice(model.first_hole[c], model.first_hole[c + 1])
-        routes.append(CableRoute(name, model.hole_nodes[holes], model.hole_weights[holes]))
+        routes.append(CableHoles(name, model.hole_nodes[holes], model.hole_weights[holes]))
     duration = 0.0 if trajectory is None else trajectory.duration
     points = np.linspace(0.0, duration, min(MOST_PATH_POINTS, 2 + int(duration / PATH_SPACING_S)))
     return LogGeometry(
@@ -203,7 +203,7 @@ def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogW
 
 
 def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractContextManager[None]:
-    """A quiet interpreter for runs that the clock paces."""
+    """Keep the interpreter quiet in runs that the clock paces."""
     if not isinstance(pace, RealTime):
         return nullcontext()
     rig = experiment.loaded.rig
@@ -212,7 +212,7 @@ def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractCo
 
 
 def _start_message(offset: float, approach: float) -> tuple[str, str]:
-    """Level and text of what is known about the start: offset [m], and time [s] that the way there takes."""
+    """Return level and text of what is known about the start: offset [m], and time [s] that the way there takes."""
     if math.isnan(offset):
         return (
             "warning",
@@ -250,7 +250,7 @@ def _summary(
 
 
 def _outcome(failure: TcrctlError | None, verdicts: tuple[Verdict, ...]) -> tuple[str, str, int]:
-    """Status, reason and exit code of a run."""
+    """Return the status, reason and exit code of a run."""
     if failure is not None:
         aborted = isinstance(failure, StoppedError | RunInterruptedError)
         return "aborted" if aborted else "error", str(failure), failure.exit_code

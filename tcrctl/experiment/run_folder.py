@@ -18,7 +18,7 @@ _TRIES: Final = 20
 
 
 def log_in(path: Path) -> Path:
-    """Path of a log that is given itself or by the folder of its run."""
+    """Return the path of a log that is given itself or by the folder of its run."""
     return path / LOG if path.is_dir() else path
 
 

@@ -1,4 +1,4 @@
-"""Worker processes that evaluate one model: each holds the problem, takes places and sends back predictions."""
+"""Worker processes that evaluate one model: each holds the regression, takes places and sends back predictions."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from multiprocessing.process import BaseProcess
 from typing import Final
 
 from tcrctl.errors import DivergenceError, NoEquilibriumError, TcrctlError
-from tcrctl.identify.problem import Problem
+from tcrctl.identify.regression import Regression
 from tcrctl.signals import Array
 
 #: How often a wait looks for signals [s].
 _LOOK: Final = 0.1
 
 
-def prediction(problem: Problem, x: Array) -> Array | None:
+def prediction(regression: Regression, x: Array) -> Array | None:
     """Return the prediction (n, 3) [m] at ``x`` of the unit cube, None if the robot has no shape there."""
     try:
-        return problem.predict(x)
+        return regression.predict(x)
     except (NoEquilibriumError, DivergenceError):
         return None
 
@@ -31,18 +31,18 @@ def prediction(problem: Problem, x: Array) -> Array | None:
 class Workers:
     """Some processes, started at once and ended with :meth:`close`."""
 
-    def __init__(self, problem: Problem, jobs: int) -> None:
+    def __init__(self, regression: Regression, jobs: int) -> None:
         """Start.
 
         Args:
-            problem: What is evaluated.
+            regression: What is evaluated.
             jobs: Number of processes.
         """
         context = multiprocessing.get_context("spawn")
         self._processes: dict[Connection, BaseProcess] = {}
         for _ in range(jobs):
             near, far = context.Pipe()
-            process = context.Process(target=_work, args=(problem, far), daemon=True)
+            process = context.Process(target=_work, args=(regression, far), daemon=True)
             process.start()
             far.close()  # the worker has it; so its end is noticed here
             self._processes[near] = process
@@ -104,7 +104,7 @@ def _noticed_end() -> Iterator[None]:
         ) from None
 
 
-def _work(problem: Problem, boss: Connection) -> None:
+def _work(regression: Regression, boss: Connection) -> None:
     """Predict until nobody asks any more: Ctrl-C is the parent's business, and a worker does not outlive it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
@@ -114,7 +114,7 @@ def _work(problem: Problem, boss: Connection) -> None:
         while True:
             x = boss.recv()
             try:
-                answer: Array | Exception | None = prediction(problem, x)
+                answer: Array | Exception | None = prediction(regression, x)
             except Exception as error:
                 answer = error
             boss.send(answer)

@@ -25,7 +25,7 @@ class Job(Protocol):
         ...
 
     def command(self, folder: Path) -> list[str]:
-        """Arguments of the process; it prints one JSON object and exits with a code of :mod:`tcrctl.errors`.
+        """Return arguments of the process; it prints one JSON object and exits with a code of :mod:`tcrctl.errors`.
 
         Args:
             folder: Where it may write.
@@ -53,7 +53,7 @@ class Run:
         return " ".join((self.experiment, *(f"--set {text}" for text in self.overrides)))
 
     def command(self, folder: Path) -> list[str]:
-        """Arguments of ``tcrctl run``."""
+        """Return the arguments of ``tcrctl run``."""
         sets = [part for text in self.overrides for part in ("--set", text)]
         program = [sys.executable, "-m", "tcrctl.cli.app", "run", self.experiment]
         return [*program, "--json", "--quiet", "--out", str(folder / RUNS), *sets]
@@ -77,6 +77,6 @@ class Check:
         return self.name.replace("_", " ")
 
     def command(self, folder: Path) -> list[str]:
-        """Arguments of the check."""
+        """Return the arguments of the check."""
         del folder
         return [sys.executable, "-m", "tcrctl.paper.checks", self.name]

@@ -54,11 +54,9 @@ class Processes:
             workers: How many run side by side.
         """
         self._folder, self._workers = folder, workers
-        self._lock, self._live, self._stopped = (
-            threading.Lock(),
-            set[subprocess.Popen[str]](),
-            threading.Event(),
-        )
+        self._lock = threading.Lock()
+        self._live = set[subprocess.Popen[str]]()
+        self._stopped = threading.Event()
 
     def run(self, jobs: Sequence[Job], begun: Callable[[Job], None], ended: Callable[[Done], None]) -> None:
         """Run jobs, first those that need the machine for themselves, one by one.
@@ -153,7 +151,7 @@ def _object(printed: str) -> Mapping[str, Any]:
 
 
 def _failure(code: int, result: Mapping[str, Any], said: str) -> str:
-    """Why a job that ended with an exit code has nothing to be measured; a missed criterion is no failure."""
+    """Say why a job that ended with an exit code has nothing to be measured; a missed criterion is no failure."""
     if code in (0, 3) and result:
         return ""
     last = said.strip().splitlines()[-1:] or ["it said nothing"]

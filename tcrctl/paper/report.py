@@ -14,9 +14,13 @@ from tcrctl.paper.row import Row, Verdict
 TITLES: Final = ("work", "paper", "must reach", "going to", "measured", "verdict")
 BAD: Final[tuple[Verdict, ...]] = ("missed", "failed")
 _WORDS: Final[Mapping[Verdict, str]] = {
-    "goal": "goal met", "met": "met", "missed": "MISSED", "shown": "-", "failed": "FAILED",
+    "goal": "goal met",
+    "met": "met",
+    "missed": "MISSED",
+    "shown": "-",
+    "failed": "FAILED",
     "not run": "not run",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +44,7 @@ class Line:
     logs: tuple[str, ...]
 
     def cells(self) -> tuple[str, ...]:
-        """Texts in the order of ``TITLES``."""
+        """Return texts in the order of ``TITLES``."""
         row, sign = self.row, ">= " if self.row.at_least else ""
         work = f"{row.work} [{row.unit}]" if row.unit else row.work
         bars = ("" if limit is None else f"{sign}{limit:g}" for limit in (row.must, row.goal))
@@ -48,7 +52,7 @@ class Line:
         return (work, row.paper, *bars, self.measured, f"{word}: {self.reason}" if self.reason else word)
 
     def as_json(self) -> dict[str, Any]:
-        """The item of ``rows`` in ``tcrctl paper --json``."""
+        """Return the item of ``rows`` in ``tcrctl paper --json``."""
         row = self.row
         return {
             "name": row.name,

@@ -1,27 +1,31 @@
 """Drag of dithered holes: what is left of the friction of cables that are moved to and fro all the time.
 
-A cable slips through hole h at the rate s_h' = (1 - ξ_h) u + p_h' v, with the drive speed u, the path x_h from the
-actuator to the hole, ξ_h = x_h / l, and p_h = ∂x_h/∂q - ξ_h ∂l/∂q: what a stretched cable gives way on both sides of
-the hole is left out. Friction F_h = T (exp(μ θ_h) - 1) whose sign turns with a dither of amplitude A, and needs the
-time τ for every turn, holds against the mean slip with c_h s_h', c_h = F_h τ / A, so that
+Material slips through hole i at the rate (1 - ξ_i) u + p_i' v, with the drive speed u, the path x_i from the actuator
+to the hole, ξ_i = x_i / l, and p_i = ∂x_i/∂q - ξ_i ∂l/∂q: what a stretched cable gives way on both sides of the hole
+is left out. Friction F_i = T (exp(μ θ_i) - 1) [SC26] whose sign turns with a dither of amplitude A, and needs the
+time τ for every turn, holds against the mean slip with c_i = F_i τ / A times its rate, so that
 
-    M v' + ... = - Σ_h c_h p_h ((1 - ξ_h) u + p_h' v)
+    M v' + ... = - Σ_i c_i p_i ((1 - ξ_i) u + p_i' v)
 
 which takes energy out of any motion. See docs/control.md.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from tcrctl.elements.rubbing_cable import COEFFICIENT, DRAG, LEAST_WRAP
 from tcrctl.elements.sliding_cable import LEAD, segment, spread
+from tcrctl.robot.equations import Workspace
 from tcrctl.robot.model import Model
-from tcrctl.robot.module import FIXED
+from tcrctl.robot.module import FIXED, SIZE
 from tcrctl.signals import Array
+
+#: A dither of that size leaves half of the drag that the law gives [m].
+SMALL: Final = 0.5e-3
 
 
 class HoleDrag(NamedTuple):
@@ -29,7 +33,7 @@ class HoleDrag(NamedTuple):
 
     Attributes:
         coefficient: c_h (n_holes,) [N s/m].
-        path: p_h (n_holes, 12 n_modules).
+        path: p_h (n_holes, n_free).
         through: 1 - ξ_h (n_holes,).
     """
 
@@ -41,77 +45,90 @@ class HoleDrag(NamedTuple):
 def no_drag(model: Model) -> HoleDrag:
     """Return drag of none of a robot's holes."""
     n = model.hole_nodes.shape[0]
-    return HoleDrag(np.zeros(n), np.zeros((n, 12 * model.mass.shape[0])), np.zeros(n))
+    return HoleDrag(np.zeros(n), np.zeros((n, SIZE * model.mass.shape[0])), np.zeros(n))
+
+
+def turn(time: float, amplitude: float) -> float:
+    """Return τ / A [s/m] of a dither of amplitude A [m]; without dither nothing is known, and no drag is counted.
+
+    Args:
+        time: τ [s].
+        amplitude: A [m]; drag falls off below :data:`SMALL`.
+    """
+    return time * amplitude / (amplitude**2 + SMALL**2)
 
 
 @njit(cache=True, error_model="numpy")
 def fill_hole_drag(
-    model: Model, q: Array, G: Array, tension: Array, friction: Array, turn: float, drag: HoleDrag
+    model: Model, q: Array, ws: Workspace, friction: Array, turn: float, drag: HoleDrag
 ) -> None:
     """Fill the drag of all holes.
 
     Args:
         model: Robot arrays.
         q: Node positions (3 n_nodes,) [m].
-        G: ∂l/∂q there (m, 3 n_nodes).
-        tension: Of the cables (m,) [N].
+        ws: Tensions and path gradients there.
         friction: Of every hole (n_holes, 3), columns as in ``elements.rubbing_cable``.
-        turn: τ / A [s/m].
+        turn: τ / A [s/m]; 0 for no drag, and nothing else is filled then.
         drag: Filled.
     """
+    drag.coefficient[:] = 0.0
+    if turn == 0.0:
+        return
     nodes, weights = model.hole_nodes, model.hole_weights
     row = np.zeros((1, q.shape[0]))
     for c in range(model.cables.shape[0]):
         first, last = model.first_hole[c], model.first_hole[c + 1] - 1
         total = model.cables[c, LEAD]
-        for h in range(first, last):
-            total += segment(q, nodes, weights, h)[0]
+        for hole in range(first, last):
+            total += segment(q, nodes, weights, hole)[0]
         row[:] = 0.0
         x, bx, by, bz = model.cables[c, LEAD], 0.0, 0.0, 0.0
-        for h in range(first, last):
-            length, ex, ey, ez = segment(q, nodes, weights, h)
-            wrap = friction[h, LEAST_WRAP]
-            if h > first:
+        for hole in range(first, last):
+            length, ex, ey, ez = segment(q, nodes, weights, hole)
+            wrap = friction[hole, LEAST_WRAP]
+            if hole > first:
                 wrap = max(np.arccos(min(bx * ex + by * ey + bz * ez, 1.0)), wrap)
             ratio = x / total
-            held = friction[h, DRAG] + max(tension[c], 0.0) * np.expm1(friction[h, COEFFICIENT] * wrap)
-            drag.coefficient[h], drag.through[h] = turn * held, 1.0 - ratio
+            held = friction[hole, DRAG] + max(ws.tension[c], 0.0) * np.expm1(
+                friction[hole, COEFFICIENT] * wrap
+            )
+            drag.coefficient[hole], drag.through[hole] = turn * held, 1.0 - ratio
             for k in range(drag.path.shape[1]):
-                drag.path[h, k] = row[0, 3 * FIXED + k] - ratio * G[c, 3 * FIXED + k]
-            spread(row, 0, nodes, weights, h, -ex, -ey, -ez)
-            spread(row, 0, nodes, weights, h + 1, ex, ey, ez)
+                drag.path[hole, k] = row[0, 3 * FIXED + k] - ratio * ws.G[c, 3 * FIXED + k]
+            spread(row, 0, nodes, weights, hole, -ex, -ey, -ez)
+            spread(row, 0, nodes, weights, hole + 1, ex, ey, ez)
             x, bx, by, bz = x + length, ex, ey, ez
 
 
 @njit(cache=True, error_model="numpy")
 def drag_force(model: Model, drag: HoleDrag, v: Array, speed: Array, force: Array) -> None:
-    """Add the drag on the robot's free nodes at the rates v (3 n_nodes,), speed (m,) [m/s] to force (12 n_modules,) [N]."""
+    """Add the drag at node velocities v (3 n_nodes,) and drive speeds (m,) [m/s] to a force (n_free,) [N]."""
     for c in range(model.cables.shape[0]):
-        for h in range(model.first_hole[c], model.first_hole[c + 1] - 1):
-            if drag.coefficient[h] > 0.0:
-                slip = drag.through[h] * speed[c]
+        for hole in range(model.first_hole[c], model.first_hole[c + 1] - 1):
+            if drag.coefficient[hole] > 0.0:
+                slip = drag.through[hole] * speed[c]
                 for k in range(force.shape[0]):
-                    slip += drag.path[h, k] * v[3 * FIXED + k]
+                    slip += drag.path[hole, k] * v[3 * FIXED + k]
                 for k in range(force.shape[0]):
-                    force[k] -= drag.coefficient[h] * slip * drag.path[h, k]
+                    force[k] -= drag.coefficient[hole] * slip * drag.path[hole, k]
 
 
 @njit(cache=True, error_model="numpy")
 def project_drag(model: Model, drag: HoleDrag, V: Array, D: Array, F: Array) -> None:
-    """Fill the reduced drag matrix D (r, r), and the drag of unit drive speeds in columns of F (r, m)."""
-    D[:], F[:] = 0.0, 0.0
+    """Add the reduced drag matrix to D (r, r), and the drag of unit drive speeds to columns of F (r, m + 1)."""
     r = V.shape[1]
     p = np.empty(r)
     for c in range(model.cables.shape[0]):
-        for h in range(model.first_hole[c], model.first_hole[c + 1] - 1):
-            if drag.coefficient[h] > 0.0:
+        for hole in range(model.first_hole[c], model.first_hole[c + 1] - 1):
+            if drag.coefficient[hole] > 0.0:
                 p[:] = 0.0
                 for k in range(V.shape[0]):
-                    value = drag.path[h, k]
+                    value = drag.path[hole, k]
                     if value != 0.0:
                         for i in range(r):
                             p[i] += value * V[k, i]
                 for i in range(r):
-                    F[i, c] -= drag.coefficient[h] * drag.through[h] * p[i]
+                    F[i, c] -= drag.coefficient[hole] * drag.through[hole] * p[i]
                     for j in range(r):
-                        D[i, j] += drag.coefficient[h] * p[i] * p[j]
+                        D[i, j] += drag.coefficient[hole] * p[i] * p[j]
