@@ -273,9 +273,7 @@ def test_slider_curves_robot_and_keys_work_together_in_a_browser(page, tmp_path)
     assert said["theme"] == "dark"
     assert said["end"] == pytest.approx(end)
     assert said["playing"]
-    assert [said["began"], said["played"]] == pytest.approx(
-        [0.0, 0.5]
-    )  # again from 0, one frame after half a second
+    assert [said["began"], said["played"]] == pytest.approx([0.0, 0.5])  # again from 0; a frame
 
 
 @in_browser
