@@ -88,6 +88,7 @@ class Estimate:
         drive: Drive lengths that the cables have now (m,) [m].
         set_point: Drive lengths that were sent last (m,) [m].
         arrived: Those sent a dead time of the drives ago (m,) [m].
+        lag: Time constant of the drives, as far as it is known [s].
         tension: Cable tensions of the model (m,) [N].
         position: End position (3,) [m].
         normal: End normal (3,).
@@ -101,6 +102,7 @@ class Estimate:
     drive: Array
     set_point: Array
     arrived: Array
+    lag: float
     tension: Array
     position: Array
     normal: Array

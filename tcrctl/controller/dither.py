@@ -53,6 +53,10 @@ def signs(robot: Robot) -> Array:
     return best
 
 
+#: From this amplitude on a robot counts as dithered, with weights and gains of its own [m].
+AWAKE: Final = 0.5e-3
+
+
 class Dithered(NamedTuple):
     """What a dither does at one moment.
 
@@ -63,6 +67,11 @@ class Dithered(NamedTuple):
 
     amplitude: float
     place: Array
+
+    @property
+    def awake(self) -> float:
+        """How far the dither has grown, 0 to 1."""
+        return min(self.amplitude / AWAKE, 1.0)
 
 
 class Dither:

@@ -12,7 +12,6 @@ from typing import Any, Final
 import numpy as np
 
 from tcrctl.controller.cost import make_target, make_weights
-from tcrctl.controller.drive_lag import DriveLag
 from tcrctl.controller.feedforward import needed_speeds, reference_poses, wanted_changes
 from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.ioc import Solution, Weights, build_ioc, solve_ioc
@@ -28,14 +27,11 @@ from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Reference
 
 #: Choice of predictor by the names of model and prediction; the settings type belongs to the latter.
-PREDICTORS: Final[Mapping[tuple[str, str], Callable[[Any, float, Robot, DriveLag], Predictor]]] = {
+PREDICTORS: Final[Mapping[tuple[str, str], Callable[[Any, float, Robot, float], Predictor]]] = {
     ("dynamic", "multi_step"): MultiStep,
     ("dynamic", "one_step"): OneStep,
     ("static", "multi_step"): Static,
 }
-
-#: Amplitude of a dither from which on W is that of a dithered robot [m].
-AWAKE: Final = 0.5e-3
 
 #: Largest violation of the LCP conditions accepted; their rows are speeds [m/s] and tensions [N].
 LCP_TOLERANCE: Final = 1e-6
@@ -57,9 +53,8 @@ class InstantaneousOptimalControl:
     def __init__(self, settings: IocSettings, robot: Robot) -> None:
         """Take a ``controller:`` section and the robot."""
         self._settings, self._m = settings, robot.n_cables
-        drives = DriveLag(settings.drives.lag_s, settings.drives.dead_time_s)
         build = PREDICTORS[settings.model, settings.prediction.kind]
-        self._predictor = build(settings.prediction, settings.period_s, robot, drives)
+        self._predictor = build(settings.prediction, settings.period_s, robot, settings.drives.dead_time_s)
         self.ahead, self.blocks = self._predictor.grid.ahead, self._predictor.grid.blocks
         self._weights = make_weights(settings, robot.n_cables, self.ahead.size)
         self._shaken = shaken_speed_change(settings)
@@ -83,7 +78,7 @@ class InstantaneousOptimalControl:
         solution, reason = NO_SOLUTION, at.doubt or _doubt(forecast)
         if not reason:
             target = make_target(self._settings, at.reference, at.shift, self._m)
-            weights = self._cautious(at.dither.amplitude)
+            weights = self._cautious(at.dither.awake)
             changes = self._free_changes(forecast, at.reference, at.previous)
             program = build_ioc(forecast.prediction, target, changes, at.low, at.high, weights)
             solution = solve_ioc(program, forecast.prediction, weights)
@@ -102,13 +97,10 @@ class InstantaneousOptimalControl:
             expected=None if reason else self._expected(at.outputs[:3], forecast, solution),
         )
 
-    def _cautious(self, amplitude: float) -> Weights:
-        """Return the weights, with the W of a dithered robot as far as the dither has grown [m]."""
-        awake = min(amplitude / AWAKE, 1.0)
-        calm, shaken = self._weights.speed_change, self._shaken
-        return (
-            self._weights._replace(speed_change=calm * (shaken / calm) ** awake) if awake else self._weights
-        )
+    def _cautious(self, awake: float) -> Weights:
+        """Return the weights, with the W of a dithered robot as far as the dither is awake."""
+        calm = self._weights.speed_change
+        return self._weights._replace(speed_change=calm * (self._shaken / calm) ** awake)
 
     def _expected(self, now: Array, forecast: Forecast, solution: Solution) -> Array:
         """Return the end position (3,) [m] one period from now, between now and the first instant."""

@@ -34,12 +34,14 @@ class IntegralAction:
             return position
         return {**position, "integral_normal": Kept(self.shift[3:], NORMAL, blind=normal)}
 
-    def update(self, error: Array, saturated: bool) -> Array:
-        """Add one period of ``error`` (6,) = wanted - measured; returns the shift.
+    def update(self, error: Array, saturated: bool, gain: float = 1.0) -> Array:
+        """Add one period of ``error`` (6,) = wanted - measured, with a part of the gain; returns the shift.
 
         Saturated inputs cannot act on more shift (anti-windup), so it does not grow then.
         """
-        wanted: Array = np.minimum(np.maximum(self.shift + self._rate * error, -self._limit), self._limit)
+        wanted: Array = np.minimum(
+            np.maximum(self.shift + gain * self._rate * error, -self._limit), self._limit
+        )
         if saturated:
             wanted = np.where(np.abs(wanted) < np.abs(self.shift), wanted, self.shift)
         self.shift = wanted

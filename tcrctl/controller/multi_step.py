@@ -8,7 +8,8 @@
 
 Δ shifts the equilibrium instead of adding a force: a constant force that holds a wrong axial tension would press
 on the slender robot like a dead load and make the prediction buckle. Weighing forces instead of filtering δ keeps
-the lightly damped lateral mode out of Δ. At the first step the robot rests, and all of δ is Δ (``from_start``). See
+the lightly damped lateral mode out of Δ. While a dither keeps the cables sliding, their drag is counted in Δ and in
+the response (robot.hole_drag), as far as it is there (controller.drag_share), and the drives' lag in what moves them. At the first step the robot rests, and all of δ is Δ (``from_start``). See
 docs/control.md.
 """
 
@@ -21,6 +22,7 @@ import numpy as np
 from numba import njit
 
 from tcrctl.controller.blocks import Grid, make_grid, superpose
+from tcrctl.controller.drag_share import DragShare, forget, learn, learning, nothing_known
 from tcrctl.controller.drive_lag import DriveLag, with_lag
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
@@ -53,6 +55,7 @@ class MultiStepMemory(NamedTuple):
         basis: Basis of the response (n_free, modes + m).
         drag: Drag of the dithered holes.
         friction: Their friction (n_holes, 3), columns as in ``elements.rubbing_cable``.
+        share: How much of the drag that it gives there is.
     """
 
     at: StaticMap
@@ -61,6 +64,29 @@ class MultiStepMemory(NamedTuple):
     basis: Array
     drag: HoleDrag
     friction: Array
+    share: DragShare
+
+
+@njit(cache=True, error_model="numpy")
+def _dragged(model: Model, ws: Workspace, memory: MultiStepMemory, now: Now, turn: float) -> Array:
+    """Return by what usual drag displaces the point that the robot vibrates about (n_free,) [m]."""
+    force, moved = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
+    if turn > 0.0:
+        drag_force(model, memory.drag, now.v, now.speed, force)
+        linear.solve(ws, force, moved)
+    return moved
+
+
+@njit(cache=True, error_model="numpy")
+def _told(model: Model, ws: Workspace, memory: MultiStepMemory, now: Now) -> Array:
+    """Return the same for a robot that follows its drives at once (n_free,) [m]: no noise of cameras is in it."""
+    v, force, moved = np.zeros(now.v.shape[0]), np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
+    for k in range(force.shape[0]):
+        for c in range(now.speed.shape[0]):
+            v[3 * FIXED + k] += memory.at.gain[k, c] * now.speed[c]
+    drag_force(model, memory.drag, v, now.speed, force)
+    linear.solve(ws, force, moved)
+    return moved
 
 
 @njit(cache=True, error_model="numpy")
@@ -70,22 +96,39 @@ def _update_offset(
     memory: MultiStepMemory,
     deviation: Array,
     now: Now,
+    tip: int,
     tuning: Tuning,
 ) -> None:
     """Filter the displacement of the point that the robot vibrates about: δ + K^-1 (M (a + α v) - drag)."""
     force, lag, v, period = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0]), now.v, tuning.period
-    drag_force(model, memory.drag, v, now.speed, force)
-    for k in range(force.shape[0]):
-        force[k] = -force[k]
     for k in range(force.shape[0]):
         i, row = k // SIZE, k % SIZE
         for b in range(SIZE):
             j = SIZE * (i + 1) + b
             force[k] += model.mass[i, row, b] * ((v[j] - memory.v[j]) / period + model.damping * v[j])
     linear.solve(ws, force, lag)
+    dragged = _dragged(model, ws, memory, now, tuning.turn)
+    if tuning.turn > 0.0:
+        told = _told(model, ws, memory, now)
+        learn(memory.share, tuning.learning, _end(deviation, lag, tip), _end(np.zeros(v.shape[0]), told, tip))
+    else:
+        forget(memory.share, tuning.learning)
+    share = memory.share.share[0]
+    for hole in range(memory.drag.coefficient.shape[0]):
+        memory.drag.coefficient[hole] *= share
     for k in range(force.shape[0]):
         j = 3 * FIXED + k
-        memory.offset[j] += tuning.blend * (deviation[j] + lag[k] - memory.offset[j])
+        memory.offset[j] += tuning.blend * (deviation[j] + lag[k] - share * dragged[k] - memory.offset[j])
+
+
+@njit(cache=True, error_model="numpy")
+def _end(base: Array, free: Array, tip: int) -> Array:
+    """Return the mean displacement (3,) of the tip ring in base (3 n_nodes,) plus free (n_free,)."""
+    mean = np.zeros(3)
+    for node in range(tip, tip + 3):
+        for i in range(3):
+            mean[i] += (base[3 * node + i] + free[3 * (node - FIXED) + i]) / 3.0
+    return mean
 
 
 @njit(cache=True, error_model="numpy")
@@ -124,7 +167,7 @@ def forecast(
         finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
     fill_hole_drag(model, at.equilibrium, ws, memory.friction, tuning.turn, memory.drag)
     if outcome.converged and tuning.blend > 0.0 and finite:
-        _update_offset(model, ws, memory, deviation, now, tuning)
+        _update_offset(model, ws, memory, deviation, now, tip, tuning)
     for k in range(q.shape[0]):
         memory.v[k] = v[k]
         away[k] = deviation[k] - memory.offset[k]
@@ -140,12 +183,13 @@ def forecast(
 class MultiStep:
     """See the module's docstring."""
 
-    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, drives: DriveLag) -> None:
-        """Take a ``prediction:`` section, the control period [s], the robot and its drives."""
+    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, dead_time: float) -> None:
+        """Take a ``prediction:`` section, the control period [s], the robot, the drives' dead time [s]."""
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
-        self._tuning = make_tuning(period, settings.filter_s)._replace(drives=drives)
+        self._tuning = make_tuning(period, settings.filter_s)._replace(learning=learning(period))
         self._turn = settings.turn_s
+        self._dead_time = dead_time
         self._work = make_workspace(robot.model)
         self._load = static_load(robot.model, robot.weight)
         at, still = rest_map(robot), np.zeros_like(robot.rest.q)
@@ -153,7 +197,7 @@ class MultiStep:
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         basis = response.start_basis(robot.model, self._work, settings.modes)
         self._memory = MultiStepMemory(
-            at, still, still.copy(), basis, no_drag(robot.model), _friction(settings, robot)
+            at, still, still.copy(), basis, no_drag(robot.model), _friction(settings, robot), nothing_known()
         )
         self._solved = False
         self._fresh = settings.offset is not None and settings.offset.from_start
@@ -187,7 +231,9 @@ class MultiStep:
         """See :class:`Predictor`."""
         robot, memory, estimate = self._robot, self._memory, at.estimate
         now = present(at)
-        tuning = self._tuning._replace(turn=turn(self._turn, at.dither.amplitude))
+        tuning = self._tuning._replace(
+            turn=turn(self._turn, at.dither.amplitude), drives=DriveLag(estimate.lag, self._dead_time)
+        )
         if self._fresh:  # the robot rests: all of its deviation is offset
             memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0)
         outcome, stable, free, gain = forecast(

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from tcrctl.controller.blocks import make_grid
-from tcrctl.controller.drive_lag import DriveLag
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.plan import Situation
@@ -33,10 +32,10 @@ MAX_ITERATIONS = 60
 class OneStep:
     """See the module's docstring."""
 
-    def __init__(self, settings: OneStepSettings, period: float, robot: Robot, drives: DriveLag) -> None:
+    def __init__(self, settings: OneStepSettings, period: float, robot: Robot, dead_time: float) -> None:
         """Take a ``prediction:`` section and the robot; the control ``period`` [s] does not matter."""
         del period
-        del drives  # it predicts what the cables do
+        del dead_time  # it predicts what the cables do
         self._robot, self._horizon = robot, settings.horizon_s
         self.grid = make_grid(1, 1, settings.horizon_s)
         self._work = make_workspace(robot.model)

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from tcrctl.controller.blocks import Grid
+from tcrctl.controller.drag_share import Learning
 from tcrctl.controller.drive_lag import DriveLag
 from tcrctl.controller.inner_map import Linearisable
 from tcrctl.controller.ioc import Prediction
@@ -46,6 +47,7 @@ class Tuning(NamedTuple):
         blend: Part of the way that the offset Δ goes in one step; 0 keeps it.
         tolerance: Largest nodal force left in the equilibrium [N].
         turn: Time of a turn of the friction over the amplitude of the dither [s/m], see robot.hole_drag.
+        learning: How the drag is learnt.
         drives: Their lag.
     """
 
@@ -53,6 +55,7 @@ class Tuning(NamedTuple):
     blend: float
     tolerance: float = TOLERANCE
     turn: float = 0.0
+    learning: Learning = Learning(0.0, 0.0, 0.0, 0.0, 0.0)
     drives: DriveLag = DriveLag(0.0, 0.0)
 
     def sharp(self) -> Tuning:

@@ -50,7 +50,7 @@ class TensionSettings(Settings):
 class IntegralSettings(Settings):
     """Integral action: the target is shifted by gain times the integrated error, with anti-windup."""
 
-    gain_1_s: float = quantity("1/s", "integral gain", 2.0, gt=0)
+    gain_1_s: float = quantity("1/s", "integral gain", 3.0, gt=0)
     limit_mm: float = quantity("mm", "largest shift of the target position", 20.0, gt=0)
     limit_deg: float = quantity("deg", "largest tilt of the target normal; output: pose only", 10.0, gt=0)
 
@@ -63,12 +63,12 @@ class DitherSettings(Settings):
     most_mm: float = quantity("mm", "largest amplitude", 2.0, gt=0, le=5)
     threshold_mm: float = quantity("mm", "innovation of the end position that is not friction", 0.3, gt=0)
     growth_1_s: float = quantity(
-        "1/s", "growth of the amplitude by innovation beyond the threshold", 8.0, gt=0
+        "1/s", "growth of the amplitude by innovation beyond the threshold", 30.0, gt=0
     )
     release_s: float = quantity("s", "time constant of its decay", 100.0, gt=0)
-    filter_s: float = quantity("s", "time constant of the innovation's size", 0.2, gt=0)
+    filter_s: float = quantity("s", "time constant of the innovation's size", 0.1, gt=0)
     outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
-    start_mm: float = quantity("mm", "amplitude at the start, before anything is known", 0.0, ge=0, le=5)
+    start_mm: float = quantity("mm", "amplitude at the start, before anything is known", 0.3, ge=0, le=5)
     settle_s: float = quantity(
         "s", "time constant of its decay until the threshold is passed for the first time", 1.5, gt=0
     )
@@ -77,6 +77,9 @@ class DitherSettings(Settings):
         "weight of squared changes of drive speed while it runs, if that is the larger one",
         6.0e3,
         gt=0,
+    )
+    integral_gain_1_s: float = quantity(
+        "1/s", "integral gain while it runs, if that is the smaller one", 2.0, gt=0
     )
 
     @model_validator(mode="after")
@@ -92,11 +95,19 @@ class DitherSettings(Settings):
 class KnownDrives(Settings):
     """What the controller believes of the drives."""
 
-    lag_s: float = quantity("s", "time constant of their position loop", 0.0, ge=0, le=2)
+    lag_s: Annotated[float, Field(ge=0, le=2)] | Literal["auto"] = Field(
+        default="auto",
+        description="time constant of their position loop [s]; auto: found from what encoders report",
+    )
     dead_time_s: float = quantity("s", "time by which set-points arrive late", 0.0, ge=0, le=2)
     reports: Literal["set_point", "encoder"] = Field(
         default="encoder", description="what they report: where they shall be, or where they are"
     )
+
+    @property
+    def lag(self) -> float | None:
+        """Time constant [s]; None if it has to be found."""
+        return None if self.lag_s == "auto" else self.lag_s
 
 
 class ControllerSection(Settings):
@@ -244,6 +255,14 @@ def shaken_speed_change(settings: IocSettings) -> float:
     """Return the weight W while a dither runs [s2/m2]."""
     calm = settings.weights.speed_change
     return calm if settings.dither is None else max(calm, settings.dither.speed_change)
+
+
+def shaken_integral(settings: IocSettings | KinematicSettings) -> float:
+    """Return which part of the integral gain is left while a dither runs."""
+    dither = settings.dither if isinstance(settings, IocSettings) else None
+    if dither is None or settings.integral is None:
+        return 1.0
+    return min(1.0, dither.integral_gain_1_s / settings.integral.gain_1_s)
 
 
 def speed_limit(settings: ControllerSettings) -> float:

@@ -15,7 +15,7 @@ from tcrctl.controller.dither import Dither
 from tcrctl.controller.inner_map import InnerMap
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.plan import Planner, Situation
-from tcrctl.controller.settings import IocSettings, KinematicSettings, speed_limit
+from tcrctl.controller.settings import IocSettings, KinematicSettings, shaken_integral, speed_limit
 from tcrctl.memory import SPEED, Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
@@ -37,6 +37,7 @@ class Shell:
         self._robot = robot
         self._planner = planner
         self._integral = IntegralAction(settings.integral, settings.period_s)
+        self._shaken_integral = shaken_integral(settings)
         self._normal = robot.rest_normal if settings.output == "pose" else None
         self._speed = np.zeros(robot.n_cables)
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
@@ -77,7 +78,8 @@ class Shell:
         error = pose_error(reference, now[:3], now[3:6])
         self._normal = now[3:6].copy() if self._settings.output == "pose" else None
         stands = planner.anti_windup and bool(self._saturated.any())
-        shift = self._integral.update(error, stands)
+        gain = 1.0 + self.dither.now.awake * (self._shaken_integral - 1.0)
+        shift = self._integral.update(error, stands, gain)
         low, high = input_limits(self._settings, self._robot, estimate.set_point, planner.blocks)
         return Situation(
             estimate=estimate,

@@ -19,7 +19,6 @@ import numpy as np
 from numba import njit
 
 from tcrctl.controller.blocks import Grid, make_grid, superpose
-from tcrctl.controller.drive_lag import DriveLag
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.plan import Situation
@@ -92,9 +91,9 @@ def forecast(
 class Static:
     """See the module's docstring."""
 
-    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, drives: DriveLag) -> None:
+    def __init__(self, settings: MultiStepSettings, period: float, robot: Robot, dead_time: float) -> None:
         """Take a ``prediction:`` section, the control period [s] and the robot."""
-        del drives  # at rest they have arrived
+        del dead_time  # at rest they have arrived
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
         self._tuning = make_tuning(period, settings.filter_s)

@@ -1,9 +1,7 @@
 """Where the drives are, from what was sent to them and what they report.
 
-A drive follows the set-point s(t - θ) of a dead time θ ago with a position loop of time constant τ. Between two
-control steps a set-point is a straight line, so the loop is followed exactly,
-
-    x_k = s_k - r + (x_(k-1) - s_(k-1) + r) e^(-T/τ),    r = τ (s_k - s_(k-1)) / T
+A drive follows the set-point s(t - θ) of a dead time θ ago with a position loop of time constant τ. Drives that
+report where they are tell their lag by it; see :mod:`tcrctl.estimator.drive_lag`.
 """
 
 from __future__ import annotations
@@ -14,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from tcrctl.estimator.drive_lag import LagSearch, follow
 from tcrctl.memory import POSITION, Kept
 from tcrctl.signals import Array
 
@@ -27,21 +26,26 @@ class BelievedDrives:
         reached: Where they are (m,) [m].
         arrived: Set-point that they have been told by now (m,) [m].
         set_point: Set-point that was sent last (m,) [m].
+        lag: τ [s].
     """
 
-    def __init__(self, lag: float, dead_time: float, reports: Reports, period: float) -> None:
-        """Take time constant, dead time and control period [s], and what the drives report."""
-        self._lag, self._period = lag, period
-        self._keep = math.exp(-period / lag) if lag > 0.0 else 0.0
-        self._reports = reports
+    def __init__(self, lag: float | None, dead_time: float, reports: Reports, period: float) -> None:
+        """Take time constant (None: to be found), dead time and control period [s], and what the drives report."""
+        self.lag = lag or 0.0
+        self._period = period
+        self._tell = reports == "encoder"
+        self._search = LagSearch(period) if lag is None and self._tell else None
         self._late = dead_time / period
         self._sent = np.zeros((math.ceil(self._late) + 1, 0))
         self.reached = self.arrived = self.set_point = np.zeros(0)
 
     def memory(self) -> Mapping[str, Kept]:
-        """Return what was sent and has not arrived, and where the drives are if they do not tell."""
+        """Return what was sent and has not arrived, and where the drives are if they do not tell.
+
+        The search of the lag is left out: it chooses among candidates, and small changes change no choice.
+        """
         sent = {"sent": Kept(self._sent.ravel(), POSITION)} if self._late > 0.0 else {}
-        if self._reports == "encoder" or self._lag == 0.0:
+        if self._tell or self.lag == 0.0:
             return sent
         return {**sent, "arrived": Kept(self.arrived, POSITION), "reached": Kept(self.reached, POSITION)}
 
@@ -58,13 +62,13 @@ class BelievedDrives:
         self._sent[1:] = self._sent[:-1].copy()
         self._sent[0] = set_point
         before, self.arrived, self.set_point = self.arrived, self._told(), set_point.copy()
-        if first or self._reports == "encoder":
+        if self._search is not None and not first:
+            self._search.observe(self.reached, reported, before, self.arrived)
+            self.lag = self._search.lag
+        if first or self._tell:
             self.reached = reported.copy()
-        elif self._lag == 0.0:
-            self.reached = self.arrived.copy()
         else:
-            rise = self._lag / self._period * (self.arrived - before)
-            self.reached = self.arrived - rise + self._keep * (self.reached - before + rise)
+            self.reached = follow(self.reached, before, self.arrived, np.array(self.lag), self._period)
 
     def _told(self) -> Array:
         """Return the set-point of a dead time ago (m,) [m]."""

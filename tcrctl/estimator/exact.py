@@ -48,6 +48,7 @@ class ExactState:
             drive=drive.copy(),
             set_point=self._drives.set_point,
             arrived=self._drives.arrived,
+            lag=self._drives.lag,
             tension=np.maximum(model.cables[:, sliding_cable.STIFFNESS] * stretch, 0.0),
             position=pose.position(q, tip),
             normal=pose.normal(q, tip),

@@ -164,6 +164,7 @@ class PassiveObserver:
             drive=self._drive,
             set_point=self._drives.set_point,
             arrived=self._drives.arrived,
+            lag=self._drives.lag,
             tension=self._work.tension.copy(),
             position=position,
             normal=normal,

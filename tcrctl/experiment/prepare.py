@@ -142,7 +142,7 @@ def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = sil
 def believed_drives(spec: ExperimentSpec) -> BelievedDrives:
     """Return the drives as the controller knows them, before the first step."""
     known = spec.controller.known_drives
-    return BelievedDrives(known.lag_s, known.dead_time_s, known.reports, spec.controller.period_s)
+    return BelievedDrives(known.lag, known.dead_time_s, known.reports, spec.controller.period_s)
 
 
 def make_trajectory(spec: ExperimentSpec, robot: Robot) -> Trajectory:

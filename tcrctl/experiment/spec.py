@@ -68,7 +68,7 @@ class StartSettings(Settings):
         "s", "time in which the offset of the start pose fades out; 0: begin with a step", 2.0, ge=0
     )
     approach_mm_s: float = quantity(
-        "mm/s", "if fading would be faster, the robot first goes to the start at this speed", 20.0, gt=0
+        "mm/s", "if fading would be faster, the robot first goes to the start at this speed", 5.0, gt=0
     )
 
     @property

@@ -52,13 +52,13 @@ def _nested(controller: dict[str, Any]) -> dict[str, Any]:
 
 def _without_news(controller: dict[str, Any]) -> dict[str, Any]:
     """Return a controller that does without what it did not have when it ran, and has by default now."""
-    found = {"dither": "off", **controller}
+    found = {"dither": "off", "drives": {"lag_s": 0.0}, **controller}
     prediction = controller.get("prediction", "multi_step")
     dynamic = controller.get("model", "dynamic") == "dynamic"
     if isinstance(prediction, str):
         prediction = {"kind": prediction}
     if dynamic and isinstance(prediction, dict) and prediction.get("kind", "multi_step") == "multi_step":
-        prediction = {"kind": "multi_step", "tension_gap": "off", **prediction}
+        prediction = {"kind": "multi_step", "tension_gap": "off", "hole_drag": "off", **prediction}
         offset = prediction.get("offset", {})
         if isinstance(offset, dict):
             prediction["offset"] = {"from_start": False, **offset}

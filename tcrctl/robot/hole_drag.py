@@ -1,8 +1,8 @@
 """Drag of dithered holes: what is left of the friction of cables that are moved to and fro all the time.
 
-Material slips through hole i at the rate (1 - ξ_i) u + p_i' v, with the drive speed u, the path x_i from the actuator
-to the hole, ξ_i = x_i / l, and p_i = ∂x_i/∂q - ξ_i ∂l/∂q: what a stretched cable gives way on both sides of the hole
-is left out. Friction F_i = T (exp(μ θ_i) - 1) [SC26] whose sign turns with a dither of amplitude A, and needs the
+Material slips through hole i at the rate (1 - ξ_i) u + p_i' v, with the drive speed u, the path x_i from the
+actuator to the hole, ξ_i = x_i / l, and p_i = ∂x_i/∂q - ξ_i ∂l/∂q: what a stretched cable gives way on both sides of
+the hole is left out. Friction F_i = T (exp(μ θ_i) - 1) [SC26] whose sign turns with a dither of amplitude A, and needs the
 time τ for every turn, holds against the mean slip with c_i = F_i τ / A times its rate, so that
 
     M v' + ... = - Σ_i c_i p_i ((1 - ξ_i) u + p_i' v)
@@ -24,8 +24,8 @@ from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
 from tcrctl.signals import Array
 
-#: A dither of that size leaves half of the drag that the law gives [m].
-SMALL: Final = 0.5e-3
+#: Smallest amplitude that keeps a cable sliding [m].
+SMALL: Final = 0.4e-3
 
 
 class HoleDrag(NamedTuple):
@@ -49,13 +49,13 @@ def no_drag(model: Model) -> HoleDrag:
 
 
 def turn(time: float, amplitude: float) -> float:
-    """Return τ / A [s/m] of a dither of amplitude A [m]; without dither nothing is known, and no drag is counted.
+    """Return τ / A [s/m] of a dither; one below :data:`SMALL` keeps no cable sliding, and no drag is counted: 0.
 
     Args:
         time: τ [s].
-        amplitude: A [m]; drag falls off below :data:`SMALL`.
+        amplitude: A [m].
     """
-    return time * amplitude / (amplitude**2 + SMALL**2)
+    return time / amplitude if amplitude >= SMALL else 0.0
 
 
 @njit(cache=True, error_model="numpy")
