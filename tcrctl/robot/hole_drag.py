@@ -1,9 +1,9 @@
 """Drag of dithered holes: what is left of the friction of cables that are moved to and fro all the time.
 
 Material slips through hole i at the rate (1 - ξ_i) u + p_i' v, with the drive speed u, the path x_i from the
-actuator to the hole, ξ_i = x_i / l, and p_i = ∂x_i/∂q - ξ_i ∂l/∂q: what a stretched cable gives way on both sides of
-the hole is left out. Friction F_i = T (exp(μ θ_i) - 1) [SC26] whose sign turns with a dither of amplitude A, and needs the
-time τ for every turn, holds against the mean slip with c_i = F_i τ / A times its rate, so that
+actuator to the hole, ξ_i = x_i / l, and p_i = ∂x_i/∂q - ξ_i ∂l/∂q: what a stretched cable gives way on both sides
+of the hole is left out. Friction F_i = T (exp(μ θ_i) - 1) [SC26] whose sign turns with a dither of amplitude A, and
+needs the time τ for every turn, holds against the mean slip with c_i = F_i τ / A times its rate, so that
 
     M v' + ... = - Σ_i c_i p_i ((1 - ξ_i) u + p_i' v)
 
