@@ -8,9 +8,9 @@
 
 Δ shifts the equilibrium instead of adding a force: a constant force that holds a wrong axial tension would press
 on the slender robot like a dead load and make the prediction buckle. Weighing forces instead of filtering δ keeps
-the lightly damped lateral mode out of Δ. While a dither keeps the cables sliding, their drag is counted in Δ and in
-the response (robot.hole_drag), as far as it is there (controller.drag_share), and the drives' lag in what moves them. At the first step the robot rests, and all of δ is Δ (``from_start``). See
-docs/control.md.
+the lightly damped lateral mode out of Δ. At the first step the robot rests, and all of δ is Δ (``from_start``).
+While a dither keeps the cables sliding, their drag counts in Δ and in the response (robot.hole_drag), as far as it
+is there (controller.drag_share). Drives that lag answer late (controller.drive_lag). See docs/control.md.
 """
 
 from __future__ import annotations

@@ -32,7 +32,11 @@ KINDS: Final[Mapping[str, tuple[type[Settings], Builder]]] = {
 
 
 def build_estimator(
-    settings: EstimatorSettings, robot: Robot, period: float, state: TrueState | None, drives: BelievedDrives
+    settings: EstimatorSettings,
+    robot: Robot,
+    period: float,
+    state: TrueState | None,
+    drives: BelievedDrives | None = None,
 ) -> Estimator:
     """Build the estimator of an ``estimator:`` section.
 
@@ -41,10 +45,10 @@ def build_estimator(
         robot: The robot that the controller knows.
         period: Control period [s].
         state: True positions and velocities of a simulated plant, None on a rig.
-        drives: Where the drives are believed to be; the estimator moves them on.
+        drives: Where the drives are believed to be, moved on by the estimator; None if they report it.
 
     Raises:
         InputError: If the exact state is asked for where there is none.
     """
     _, build = KINDS[settings.kind]
-    return build(settings, robot, period, state, drives)
+    return build(settings, robot, period, state, drives or BelievedDrives(None, 0.0, "encoder", period))

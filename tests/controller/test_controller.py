@@ -20,11 +20,11 @@ from support.closed_loop import (
     pose_settings,
     resting,
     settings_of,
+    situation,
 )
 from tcrctl.controller.blocks import block_edges, superpose
 from tcrctl.controller.controller import KINDS as CONTROLLERS
 from tcrctl.controller.controller import PLANNERS, build_controller
-from tcrctl.controller.cost import outputs
 from tcrctl.controller.integral import IntegralAction
 from tcrctl.controller.multi_step import MultiStep
 from tcrctl.controller.prediction_settings import OffsetSettings, Prediction
@@ -208,10 +208,10 @@ def test_the_forecast_is_what_the_robot_then_does(tcr700):
     """Multi-step prediction against the nonlinear simulation for small piecewise constant speeds."""
     settings = pose_settings()
     prediction = settings.prediction
-    predictor = MultiStep(prediction, settings.period_s, tcr700)
+    predictor = MultiStep(prediction, settings.period_s, tcr700, 0.0)
     rng = np.random.default_rng(5)
     U = 0.004 * rng.standard_normal((prediction.blocks, 6))
-    forecast = predictor.predict(rest := resting(tcr700), 0.0, outputs(rest, 0.0, tcr700), np.zeros(6))
+    forecast = predictor.predict(situation(tcr700, resting(tcr700)))
     predicted = forecast.prediction.free + forecast.prediction.gain @ U.ravel()
     state = dynamics.rest_state(tcr700.rest.q, np.zeros(6))
     ws, scratch = make_workspace(tcr700.model), dynamics.make_scratch(tcr700.model)

@@ -10,7 +10,7 @@ import pytest
 
 from support.closed_loop import constant, ioc, resting
 from tcrctl.controller.controller import build_controller
-from tcrctl.controller.dither import MOST_CABLES, Dither, signs
+from tcrctl.controller.dither import MOST_CABLES, Dither, Dithered, signs
 from tcrctl.controller.settings import DitherSettings
 from tcrctl.errors import SpecError
 from tcrctl.experiment.prepare import build_parts, build_plant, prepare
@@ -92,8 +92,26 @@ def test_it_grows_while_the_end_goes_elsewhere_and_releases_slowly(tcr700):
     assert ratio == pytest.approx(np.exp(-1.0), rel=0.02)
 
 
+def test_it_is_small_at_the_start_and_gone_before_long(tcr700):
+    dither = running(tcr700, start_mm=0.3, settle_s=1.0)
+    found = watch(dither, np.tile([0.2e-3, 0.0, 0.0], (200, 1)))
+    np.testing.assert_allclose(found, 0.3e-3 * (1.0 - PERIOD) ** np.arange(1, 201), rtol=1e-9)
+
+
+def test_once_woken_it_is_released_slowly(tcr700):
+    dither = running(tcr700, start_mm=0.3, settle_s=0.5, release_s=50.0)
+    watch(dither, np.tile([2e-3, 0.0, 0.0], (60, 1)))
+    grown = watch(dither, np.zeros((100, 3)))[-1]
+    assert watch(dither, np.zeros((100, 3)))[-1] == pytest.approx(grown * np.exp(-1.0 / 50.0), rel=1e-3)
+
+
+@pytest.mark.parametrize(("amplitude", "awake"), [(0.0, 0.0), (0.25e-3, 0.5), (0.5e-3, 1.0), (2e-3, 1.0)])
+def test_it_is_awake_from_half_a_millimetre_on(amplitude, awake):
+    assert Dithered(amplitude, np.zeros(3)).awake == pytest.approx(awake)
+
+
 def test_what_is_no_friction_leaves_it_at_rest(tcr700):
-    dither = running(tcr700)
+    dither = running(tcr700, start_mm=0.0)
     assert not watch(dither, np.tile([0.2e-3, 0.0, 0.0], (500, 1))).any()
     assert not np.any(dither.speed())
 

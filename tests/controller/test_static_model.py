@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from support.closed_loop import closed_loop, constant, ioc, pose_settings, resting
+from support.closed_loop import closed_loop, constant, ioc, pose_settings, resting, situation
 from tcrctl.controller.blocks import block_edges
 from tcrctl.controller.controller import build_controller
-from tcrctl.controller.cost import outputs
 from tcrctl.controller.prediction_settings import OffsetSettings
 from tcrctl.controller.static import Static
 from tcrctl.plant.settings import Mismatch
@@ -23,8 +22,8 @@ from tcrctl.robot.response import POSE_ROWS
 def static(robot, estimate, **changes):
     """Forecast of the static model for an estimate (blocks as shipped), and the settings of its prediction."""
     settings = pose_settings(prediction="static", **changes)
-    predictor = Static(settings.prediction, settings.period_s, robot)
-    forecast = predictor.predict(estimate, 0.0, outputs(estimate, 0.0, robot), np.zeros(robot.n_cables))
+    predictor = Static(settings.prediction, settings.period_s, robot, 0.0)
+    forecast = predictor.predict(situation(robot, estimate))
     return forecast, settings.prediction
 
 

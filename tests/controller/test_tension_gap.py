@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from support.closed_loop import closed_loop, ioc, resting
+from support.closed_loop import closed_loop, ioc, resting, situation
 from tcrctl.controller.multi_step import MultiStep
 from tcrctl.controller.prediction_settings import MultiStepSettings, TensionGapSettings
 from tcrctl.controller.tension_gap import TensionGap
@@ -51,12 +51,12 @@ def test_its_memory_is_the_filter_itself():
 def test_a_prediction_begins_at_the_models_tensions(tcr700, offset):
     """Whatever a robot at rest seems to be under."""
     settings = MultiStepSettings.model_validate({"kind": "multi_step", "offset": offset})
-    predictor = MultiStep(settings, PERIOD, tcr700)
+    predictor = MultiStep(settings, PERIOD, tcr700, 0.0)
     estimate = resting(tcr700)
     estimate.tension[:] *= 1.15
     outputs = np.concatenate([estimate.position, estimate.normal, [0.0], estimate.tension])
     for _ in range(3):
-        forecast = predictor.predict(estimate, 0.0, outputs, np.zeros(6))
+        forecast = predictor.predict(situation(tcr700, estimate))
         found = forecast.prediction.free[-1, POSE_ROWS:]
         np.testing.assert_allclose(found, tcr700.rest.tension, rtol=0.02)
     assert "tension_gap" in predictor.memory()

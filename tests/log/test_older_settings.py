@@ -38,7 +38,7 @@ def old(model, prediction):
 
 
 #: What the dynamic multi-step prediction has today and had not.
-NEWS = {"tension_gap": "off", "offset": {"from_start": False, **BESIDE["offset"]}}
+NEWS = {"tension_gap": "off", "hole_drag": "off", "offset": {"from_start": False, **BESIDE["offset"]}}
 OBSERVER = {"kind": "passive_observer", "stiffness_n_m": 1000.0, "pose_filter_s": 0.5}
 
 

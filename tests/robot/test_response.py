@@ -10,6 +10,7 @@ from support.mechanics import FREE
 from tcrctl.robot import dynamics, linear, pose, response
 from tcrctl.robot.equations import assemble, make_workspace
 from tcrctl.robot.equilibrium import equilibrium, static_load
+from tcrctl.robot.hole_drag import no_drag
 from tcrctl.robot.modes import modes
 
 ROBOTS = ["tcr600", "tcr700"]
@@ -44,7 +45,7 @@ class Bent:
         assert linear.factor_shifted(ws.K, ws.U) == 0.0
         return ws
 
-    def respond(self, offset, v, step, steps):
+    def respond(self, offset, v, step, steps, drag=None):
         change, stable = response.respond(
             self.model,
             self.rest.q,
@@ -53,6 +54,7 @@ class Bent:
             self.robot.tip,
             self.workspace(),
             self.basis.copy(),
+            no_drag(self.model) if drag is None else drag,
         )
         assert stable
         return change
@@ -180,7 +182,7 @@ def test_a_slack_cable_keeps_its_authority_over_its_predicted_tension(tcr700):
     still = np.zeros_like(bent.rest.q)
     release, ahead = response.Release(still, still), instants(0.02, 5)
     change, stable = response.respond(
-        bent.model, bent.rest.q, release, ahead, tcr700.tip, ws, bent.basis.copy()
+        bent.model, bent.rest.q, release, ahead, tcr700.tip, ws, bent.basis.copy(), no_drag(bent.model)
     )
     assert stable
     assert change[-1, 7 + 1, 1] > 0.0

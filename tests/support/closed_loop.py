@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tcrctl.controller.controller import build_controller
+from tcrctl.controller.cost import outputs
+from tcrctl.controller.dither import Dithered
+from tcrctl.controller.plan import Situation
 from tcrctl.controller.settings import CostWeights, IocSettings, KinematicSettings
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.settings import PassiveObserverSettings
@@ -50,11 +53,33 @@ def resting(robot, drive=None) -> Estimate:
         q=q.copy(),
         v=np.zeros_like(q),
         drive=np.zeros(robot.n_cables) if drive is None else drive,
+        set_point=np.zeros(robot.n_cables) if drive is None else drive,
+        arrived=np.zeros(robot.n_cables) if drive is None else drive,
+        lag=0.0,
         tension=robot.rest.tension.copy(),
         position=robot.rest_position,
         normal=robot.rest_normal,
         disturbance=np.zeros_like(q),
         converged=True,
+    )
+
+
+def situation(robot, estimate, speed=None, amplitude=0.0) -> Situation:
+    """What a predictor is told by an estimate that is not old, under a dither of an amplitude [m] at its middle."""
+    m = robot.n_cables
+    still, limit = np.zeros(m), np.zeros(0)
+    return Situation(
+        estimate=estimate,
+        reference=None,
+        age=0.0,
+        outputs=outputs(estimate, 0.0, robot),
+        error=np.zeros(6),
+        shift=np.zeros(6),
+        previous=still if speed is None else speed,
+        low=limit,
+        high=limit,
+        doubt="",
+        dither=Dithered(amplitude, still),
     )
 
 
