@@ -95,6 +95,7 @@ class Dither:
         self._woken = False
         self._place = np.zeros(robot.n_cables)
         self._expects, self._expected = False, np.zeros(3)
+        self._position, self._motions = np.zeros(3), np.zeros((2 * self._half_wave, 3))
         self._errors = np.zeros((2 * self._half_wave, 3))
         self._blend = -float(np.expm1(-period / self._settings.filter_s))
 
@@ -139,10 +140,14 @@ class Dither:
             position: Measured end position (3,) [m].
         """
         if not (self.runs and self._expects and np.isfinite(position).all()):
+            self._position[:] = position
             return
         s = self._settings
         self._errors[self._step % self._errors.shape[0]] = position - self._expected
+        self._motions[self._step % self._motions.shape[0]] = self._expected - self._position
+        self._position[:] = position
         size = float(np.linalg.norm(np.mean(self._errors, axis=0)))
+        size = max(size - s.motion_part * float(np.linalg.norm(np.mean(self._motions, axis=0))), 0.0)
         amplitude, innovation = self._sizes
         innovation += self._blend * (min(size, s.outlier_mm / 1e3) - innovation)
         excess = innovation - s.threshold_mm / 1e3

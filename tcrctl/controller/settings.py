@@ -61,14 +61,17 @@ class DitherSettings(Settings):
     frequency_hz: float = quantity("Hz", "frequency of the triangle wave", 5.0, gt=0, le=100)
     least_mm: float = quantity("mm", "smallest amplitude, there from the start", 0.0, ge=0, le=5)
     most_mm: float = quantity("mm", "largest amplitude", 2.0, gt=0, le=5)
-    threshold_mm: float = quantity("mm", "innovation of the end position that is not friction", 0.3, gt=0)
+    threshold_mm: float = quantity("mm", "innovation of the end position that is not friction", 0.2, gt=0)
+    motion_part: float = quantity(
+        "1", "part of the motion expected by which a model without friction is wrong, too", 0.5, ge=0, le=1
+    )
     growth_1_s: float = quantity(
         "1/s", "growth of the amplitude by innovation beyond the threshold", 30.0, gt=0
     )
     release_s: float = quantity("s", "time constant of its decay", 100.0, gt=0)
     filter_s: float = quantity("s", "time constant of the innovation's size", 0.1, gt=0)
     outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
-    start_mm: float = quantity("mm", "amplitude at the start, before anything is known", 0.25, ge=0, le=5)
+    start_mm: float = quantity("mm", "amplitude at the start, before anything is known", 0.35, ge=0, le=5)
     settle_s: float = quantity(
         "s", "time constant of its decay until the threshold is passed for the first time", 1.5, gt=0
     )

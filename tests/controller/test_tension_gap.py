@@ -54,7 +54,6 @@ def test_a_prediction_begins_at_the_models_tensions(tcr700, offset):
     predictor = MultiStep(settings, PERIOD, tcr700, 0.0)
     estimate = resting(tcr700)
     estimate.tension[:] *= 1.15
-    outputs = np.concatenate([estimate.position, estimate.normal, [0.0], estimate.tension])
     for _ in range(3):
         forecast = predictor.predict(situation(tcr700, estimate))
         found = forecast.prediction.free[-1, POSE_ROWS:]
