@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 from pydantic import Field
 
 from tcrctl.config.settings import Settings, quantity
+from tcrctl.estimator.calibration_settings import Calibrated, CalibrationSettings
 
 
 class PassiveObserverSettings(Settings):
@@ -31,6 +32,16 @@ class PassiveObserverSettings(Settings):
     hold_blank: bool = Field(
         default=True, description="a frame without any marker repeats the last one, instead of none"
     )
+    calibration: Calibrated = Field(
+        default="off",
+        description="where cameras and markers really are: path of a calibration file relative to this one, what "
+        "it says, or off",
+    )
+
+    @property
+    def calibrated(self) -> CalibrationSettings | None:
+        """What is known of cameras and markers; None if nothing, or if the file is not read yet."""
+        return self.calibration if isinstance(self.calibration, CalibrationSettings) else None
 
 
 class ExactSettings(Settings):
@@ -40,6 +51,11 @@ class ExactSettings(Settings):
     needs_every_step: ClassVar[bool] = True
 
     kind: Literal["exact"]
+
+    @property
+    def calibrated(self) -> None:
+        """No cameras are asked."""
+        return None
 
 
 EstimatorSettings: TypeAlias = Annotated[
