@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
-from tcrctl.config.settings import Settings, quantity
+from tcrctl.config.settings import Settings, ShortKind, quantity
 from tcrctl.estimator.calibration_settings import Calibrated, CalibrationSettings
 
 
@@ -59,5 +59,7 @@ class ExactSettings(Settings):
 
 
 EstimatorSettings: TypeAlias = Annotated[
-    PassiveObserverSettings | ExactSettings, Field(discriminator="kind", description="state estimator")
+    PassiveObserverSettings | ExactSettings,
+    Field(discriminator="kind", description="state estimator"),
+    ShortKind("passive_observer", "exact"),
 ]

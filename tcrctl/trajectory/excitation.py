@@ -5,7 +5,7 @@
     the same in poses that nobody chose                        held out, to judge the result
 
 After a shake a cable rests near the middle of what friction lets it, wherever it came from; after a pull it rests
-at the edge.
+at the edge. Shakes end on one side and on the other in turn, so that the play of the drives shows.
 """  # fmt: skip
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ def program(settings: ExcitationSettings, robot: Robot) -> DrivesSettings:
     poses = poses_of(settings, robot)
     legs = [*_pulls(settings, robot.n_cables)]
     corners = np.vstack([np.zeros((2, robot.n_cables)), poses, np.zeros((1, robot.n_cables))])
-    for last, pose in pairwise(corners):
-        legs += _pose(settings, last, pose, signs(robot))
+    for k, (last, pose) in enumerate(pairwise(corners)):
+        legs += _pose(settings, last, pose, signs(robot) * (-1.0) ** k)
     return DrivesSettings(
         kind="drives", legs=tuple(legs), lead_in_s=settings.lead_in_s, settle_s=settings.settle_s
     )

@@ -7,11 +7,9 @@ Between two steps a set-point moves at constant speed, and x follows it exactly;
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.signal import lfilter
 
 from tcrctl.log.reader import Log
 from tcrctl.signals import Array
@@ -61,13 +59,15 @@ def fit_answer(period: float, applied: Array, reported: Array) -> DriveAnswer:
     if np.abs(asked - reported).max() < SAME or np.ptp(asked, axis=0).max() < SAME:
         return UNKNOWN
 
+    from scipy import optimize
+
+    solve: Any = optimize.least_squares  # a module of the same name confuses the type checker
+
     def left(guess: Array) -> Array:
         return (1e3 * (followed(period, asked, float(guess[0]), float(guess[1])) - reported)).ravel()
 
     bounds = ([1e-4, 0.0], [LONGEST, LONGEST])
-    found = [
-        least_squares(left, start, bounds=bounds, x_scale=(0.01, 0.01), diff_step=1e-2) for start in STARTS
-    ]
+    found = [solve(left, start, bounds=bounds, x_scale=(0.01, 0.01), diff_step=1e-2) for start in STARTS]
     best = min(found, key=lambda result: float(result.cost))
     error = float(np.sqrt(2.0 * best.cost / reported.size))
     return DriveAnswer(float(best.x[0]), float(best.x[1]), 1e-3 * error)
@@ -75,6 +75,9 @@ def fit_answer(period: float, applied: Array, reported: Array) -> DriveAnswer:
 
 def followed(period: float, asked: Array, lag: float, dead_time: float) -> Array:
     """Return where drives are (k, m) [m] that follow set-points (k, m) [m], one per ``period`` [s]."""
+    from scipy import signal
+
+    recursion: Any = signal.lfilter  # type: ignore[attr-defined]  # not known to the type checker
     steps = max(1, round(period / STEP))
     h, keep = period / steps, float(np.exp(-period / steps / lag))
     t = np.arange((asked.shape[0] - 1) * steps + 1) * h - dead_time
@@ -82,5 +85,5 @@ def followed(period: float, asked: Array, lag: float, dead_time: float) -> Array
     fine = np.stack([np.interp(t, at, column) for column in asked.T], axis=1)
     behind = lag * np.diff(fine, axis=0) / h  # exact for a straight line between two instants
     driven = fine[1:] - behind - keep * (fine[:-1] - behind)
-    x, _ = lfilter([1.0], [1.0, -keep], driven, axis=0, zi=keep * fine[:1])
+    x, _ = recursion([1.0], [1.0, -keep], driven, axis=0, zi=keep * fine[:1])
     return np.vstack([fine[:1], x])[::steps]
