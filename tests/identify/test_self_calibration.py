@@ -1,4 +1,4 @@
-"""Laws of the self-calibration: slopes, known values recovered, what cannot be told, files that say what was found."""
+"""Laws of the self-calibration: slopes, known values recovered, what cannot be told, files of what was found."""
 
 from __future__ import annotations
 

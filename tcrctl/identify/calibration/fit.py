@@ -82,7 +82,7 @@ class Calibrator:
                 break
             move = np.linalg.solve(information, J.T @ r - x / prior)
             step = float(np.abs(move).max())
-            x, k = x + prior * move * min(1.0, LONGEST / step), k + 1
+            x, k = x + prior * move * (LONGEST / max(step, LONGEST)), k + 1
         covariance = np.linalg.inv(information) * np.outer(prior, prior)
         residual = np.array([raw for _, _, raw in rows])
         return Fit(x, covariance, residual, weight, float(r @ r / max(r.size, 1)), k, step < SMALL)
