@@ -26,7 +26,10 @@ def calibrate_log(log: str, changes: Sequence[str], out: Path, say: Say, as_json
         print(json.dumps(found.result.as_json(robot, calibration)))
     else:
         _print(found.result)
-        print(f"next run: tcrctl run SPEC --set robot={robot} --set estimator.calibration={calibration}")
+        rubs = " --set controller.dither.least_mm=2" if found.result.rubbing.rubs else ""
+        print(
+            f"next run: tcrctl run SPEC --set robot={robot} --set estimator.calibration={calibration}{rubs}"
+        )
         print("of a simulated plant also --set plant.robot=NAME, with the robot that the log was made with")
     return 0 if found.result.fit.converged else 1
 
