@@ -12,6 +12,7 @@ from tcrctl.config import strict_yaml
 from tcrctl.errors import SpecError
 from tcrctl.estimator.calibration import MarkerCalibration
 from tcrctl.estimator.calibration_settings import CalibrationSettings, CameraFrameSettings
+from tcrctl.experiment.spec import ExperimentSpec
 from tcrctl.plant.cameras import draw_cameras
 from tcrctl.plant.reality_settings import CameraSettings, FrameError
 from tcrctl.robot.module import is_ring_node, node_names, ring_rows
@@ -87,3 +88,14 @@ def test_markers_of_another_robot_are_refused(tmp_path, name):
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(SpecError, match=r"nowhere\.yaml"):
         short_spec(f"estimator.calibration={tmp_path / 'nowhere.yaml'}")
+
+
+def test_the_resolved_values_are_read_again_as_they_are(tmp_path):
+    settings = CalibrationSettings(
+        frame=CameraFrameSettings(rotation_deg=(0.1, 0.2, 0.3)), markers_mm={"m1.n1": (0.1, -0.2, 0.3)}
+    )
+    spec = short_spec(f"estimator.calibration={written(tmp_path / 'c.yaml', settings)}").spec
+    again = strict_yaml.validate(
+        strict_yaml.loads(strict_yaml.dumps(spec.model_dump(mode="json"))), ExperimentSpec
+    )
+    assert again.estimator == spec.estimator
