@@ -56,7 +56,7 @@ class ExcitationSettings(TrajectorySection):
     seed: int = Field(default=0, ge=0, lt=2**63, description="seed of what is drawn")
     shake: ShakeSettings = ShakeSettings()
     move_s: Positive = quantity("s", "least time of a motion from pose to pose", 2.0)
-    speed_mm_s: Positive = quantity("mm/s", "peak speed of a drive in it; long motions take longer", 40.0)
+    speed_mm_s: Positive = quantity("mm/s", "peak speed of a drive in it; long motions take longer", 35.0)
     rest_s: Positive = quantity("s", "rest in every pose", 2.5)
     lead_in_s: NotNegative = quantity("s", "rest at the start", 3.0)
     settle_s: NotNegative = quantity("s", "rest at the very end", 1.0)
