@@ -7,7 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from tcrctl.cli.app import main
 from tcrctl.config import strict_yaml
+from tcrctl.estimator.calibration_settings import CalibrationSettings
 from tcrctl.experiment.prepare import build_parts, build_plant, prepare
 from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.spec import load_spec
@@ -111,3 +113,34 @@ def test_a_calibrated_run_is_replayed_bit_for_bit_without_its_files(found, tmp_p
     assert again.compared > 10
     uncalibrated = replay(log, overrides=["estimator.calibration=off"])
     assert uncalibrated.status == "different"
+
+
+@pytest.mark.slow
+def test_the_verb_finds_the_same_and_says_where_its_files_are(found, tmp_path, capsys):
+    log = str(found[0].log.path.parent)
+    assert (
+        main(["identify", "--calibrate", log, "--set", "friction=false", "--out", str(tmp_path), "--json"])
+        == 0
+    )
+    said = json.loads(capsys.readouterr().out)
+    assert said["status"] == "success"
+    assert said["parameters"]["springs"]["value"] == pytest.approx(found[0].result.fit.x[0], rel=1e-6)
+    assert strict_yaml.validate(strict_yaml.load(said["calibration_file"]), CalibrationSettings).markers_mm
+
+
+@pytest.mark.slow
+def test_a_designed_excitation_runs_with_the_poses_that_were_chosen(tmp_path, capsys):
+    given = load_spec("excitation", EXCITATION).spec.model_dump(mode="json")
+    given["trajectory"]["poses"], given["trajectory"]["poses_mm"] = 4, []
+    file = tmp_path / "mine.yaml"
+    file.write_text(strict_yaml.dumps(given))
+    assert main(["identify", "--design", str(file), "--out", str(tmp_path), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["information"] >= said["information_drawn"]
+    spec = load_spec(said["excitation_file"]).spec
+    assert len(spec.trajectory.poses_mm) == said["poses"] == 4
+
+
+def test_a_verb_that_is_told_two_things_at_once_refuses(capsys):
+    assert main(["identify", "--calibrate", "a", "--design", "b"]) == 2
+    assert "stand alone" in capsys.readouterr().err
