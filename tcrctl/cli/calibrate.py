@@ -27,10 +27,8 @@ def calibrate_log(log: str, changes: Sequence[str], out: Path, say: Say, as_json
     else:
         _print(found.result)
         rubs = " --set controller.dither.least_mm=2" if found.result.rubbing.rubs else ""
-        print(
-            f"next run: tcrctl run SPEC --set robot={robot} --set estimator.calibration={calibration}{rubs}"
-        )
-        print("of a simulated plant also --set plant.robot=NAME, with the robot that the log was made with")
+        print(f"next run: tcrctl run SPEC --set estimator.calibration={calibration}{rubs}")
+        print(f"the robot as it was found, to look at or to try as robot: {robot}")
     return 0 if found.result.fit.converged else 1
 
 
