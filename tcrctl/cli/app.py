@@ -83,7 +83,9 @@ def build_app() -> typer.Typer:
     rig = typer.Typer(no_args_is_help=True, rich_markup_mode="rich")
     for name, verb in RIG_VERBS.items():
         rig.command(name)(verb)
-    app.add_typer(rig, name="rig", help="Work on a bench: check, status, calibrate, zero, jog, reset.")
+    app.add_typer(
+        rig, name="rig", help="Work on a bench: check, status, calibrate, zero, excite, jog, reset."
+    )
     return app
 
 

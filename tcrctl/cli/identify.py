@@ -57,6 +57,18 @@ Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the folde
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
+Calibrate = Annotated[
+    str | None,
+    typer.Option(
+        "--calibrate", metavar="LOG", help="Log of an excitation: find its robot, cameras and drives."
+    ),
+]
+Design = Annotated[
+    str | None,
+    typer.Option("--design", metavar="SPEC", help="An excitation: choose the poses that tell most."),
+]
+
+
 @dataclass(frozen=True)
 class Told:
     """An identification that is told on the command line, without a file."""
@@ -64,6 +76,14 @@ class Told:
     data: From = None
     robot: RobotName = None
     params: Params = None
+
+
+@dataclass(frozen=True)
+class Instead:
+    """What is done instead of finding parameters."""
+
+    calibrate: Calibrate = None
+    design: Design = None
 
 
 @dataclass(frozen=True)
@@ -75,16 +95,24 @@ class Changed:
     seed: Seed = None
 
 
+@dataclass(frozen=True)
+class Shown:
+    """What is printed."""
+
+    quiet: Quiet = False
+    as_json: AsJson = False
+
+
 @unfolded
 def identify(
     inputs: Inputs = None,
     told: Told = Told(),
+    instead: Instead = Instead(),
     changed: Changed = Changed(),
     jobs: Jobs = None,
     overrides: Overrides = None,
     out: Out = Path("logs"),
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    shown: Shown = Shown(),
 ) -> None:
     r"""Find parameters of a robot from measured positions, and say how certain they are.
 
@@ -97,26 +125,30 @@ def identify(
       tcrctl identify --from run1.mcap run2.mcap --robot tcr700 \
                       --params springs.youngs_modulus_mpa,cables.youngs_modulus_mpa
       tcrctl run helix --set robot=logs/TIME_NAME_ID/robot.yaml
+      tcrctl run excitation && tcrctl identify --calibrate logs/TIME_excitation_ID
+      tcrctl identify --design excitation
     """
     from tcrctl.loop.interruption import signals_exit
 
-    say = (lambda text: None) if quiet else _say
+    say = (lambda text: None) if shown.quiet else _say
     changes = [*(overrides or ()), *_assignments(changed)]
     with signals_exit():
         from tcrctl.experiment.run_folder import check_writable
 
         check_writable(out)
+        if instead.calibrate or instead.design:
+            raise typer.Exit(_instead(inputs or [], told, instead, changes, out, say, shown.as_json))
         loaded = _loaded(inputs or [], told, changes)
         say(_headline(loaded))
         from tcrctl.identify.identification import identify as find
-    with _progress_line(shown=not quiet) as progress:
+    with _progress_line(shown=not shown.quiet) as progress:
         result = find(loaded, jobs=jobs, notify=say, progress=progress)
     files = _write(loaded, result, out)
     for warning in result.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     if result.reason:
         print(f"{result.status}: {result.reason}; this is the best answer until then", file=sys.stderr)
-    if as_json:
+    if shown.as_json:
         print(json.dumps(result.as_json(*files)))
     else:
         from tcrctl.cli.identify_table import print_result
@@ -125,6 +157,25 @@ def identify(
         print(f"new robot: tcrctl run SPEC --set robot={files[0]}")
     if result.exit_code:
         raise typer.Exit(result.exit_code)
+
+
+def _instead(
+    inputs: list[str],
+    told: Told,
+    instead: Instead,
+    changes: list[str],
+    out: Path,
+    say: Callable[[str], None],
+    as_json: bool,
+) -> int:
+    from tcrctl.cli.calibrate import calibrate_log, design_poses
+    from tcrctl.errors import InputError
+
+    if inputs or told != Told() or (instead.calibrate and instead.design):
+        raise InputError("--calibrate and --design stand alone", hint="See: tcrctl identify --help")
+    if instead.calibrate:
+        return calibrate_log(instead.calibrate, changes, out, say, as_json)
+    return design_poses(instead.design or "", changes, out, say, as_json)
 
 
 def _assignments(changed: Changed) -> list[str]:

@@ -13,7 +13,8 @@ the measured tip ring and the model's; while the tip ring is not seen, the last 
 
 A robot may hang beside its model from the start: the first frame is taken for a robot at rest (``fit_start``). A
 frame without any marker would let the model swing back there: it repeats the last one (``hold_blank``), and a
-single lost marker is filled in for a while (``lost_markers``).
+single lost marker is filled in for a while (``lost_markers``). What is known of cameras and markers is taken out
+of every frame first (``calibration``).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tcrctl.estimator.calibration import MarkerCalibration
 from tcrctl.estimator.drives import BelievedDrives
 from tcrctl.estimator.exact import TrueState
 from tcrctl.estimator.lost_markers import LostMarkers
@@ -64,6 +66,7 @@ class PassiveObserver:
         self._frame = np.zeros((rows.size, 3))
         self._frame_valid = np.zeros(rows.size, dtype=np.bool_)
         self._lost = LostMarkers(rows.size, period)
+        self._calibration = MarkerCalibration.of(settings.calibrated, robot.n_modules)
         self._work = make_workspace(robot.model)
         self._scratch = dynamics.make_scratch(robot.model)
         self._scratch.nodal[FORCE] = robot.weight
@@ -142,6 +145,7 @@ class PassiveObserver:
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Step the model to the time of ``measured``."""
         self._drives.update(measured.drive, applied.drive)
+        measured = self._calibration.corrected(measured, self._at_markers(self._q))
         measured = replace(self._held(measured), drive=self._drives.reached)
         if self._fits and measured.valid.any():
             self._fit(measured)

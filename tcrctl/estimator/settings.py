@@ -6,7 +6,8 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
-from tcrctl.config.settings import Settings, quantity
+from tcrctl.config.settings import Settings, ShortKind, quantity
+from tcrctl.estimator.calibration_settings import Calibrated, CalibrationSettings
 
 
 class PassiveObserverSettings(Settings):
@@ -31,6 +32,16 @@ class PassiveObserverSettings(Settings):
     hold_blank: bool = Field(
         default=True, description="a frame without any marker repeats the last one, instead of none"
     )
+    calibration: Calibrated = Field(
+        default="off",
+        description="where cameras and markers really are: path of a calibration file relative to this one, what "
+        "it says, or off",
+    )
+
+    @property
+    def calibrated(self) -> CalibrationSettings | None:
+        """What is known of cameras and markers; None if nothing, or if the file is not read yet."""
+        return self.calibration if isinstance(self.calibration, CalibrationSettings) else None
 
 
 class ExactSettings(Settings):
@@ -41,7 +52,14 @@ class ExactSettings(Settings):
 
     kind: Literal["exact"]
 
+    @property
+    def calibrated(self) -> None:
+        """No cameras are asked."""
+        return None
+
 
 EstimatorSettings: TypeAlias = Annotated[
-    PassiveObserverSettings | ExactSettings, Field(discriminator="kind", description="state estimator")
+    PassiveObserverSettings | ExactSettings,
+    Field(discriminator="kind", description="state estimator"),
+    ShortKind("passive_observer", "exact"),
 ]

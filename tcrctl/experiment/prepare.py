@@ -12,6 +12,7 @@ import numpy as np
 from tcrctl.controller.controller import build_controller
 from tcrctl.controller.settings import speed_limit
 from tcrctl.errors import InputError, StoppedError
+from tcrctl.estimator.calibration import MarkerCalibration
 from tcrctl.estimator.drives import BelievedDrives
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.exact import TrueState
@@ -217,7 +218,8 @@ def build_parts(experiment: Experiment, plant: Plant, state: TrueState | None) -
     robot = experiment.robot
     period = experiment.period
     trajectory, offset = experiment.trajectory, np.nan
-    found = measured_pose(plant, robot)
+    calibration = MarkerCalibration.of(spec.estimator.calibrated, robot.n_modules)
+    found = measured_pose(plant, robot, calibration)
     if found is not None:
         offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))
         trajectory = StartBlend(trajectory, *found, spec.start.blend_s, spec.start.approach)
@@ -233,16 +235,20 @@ def build_parts(experiment: Experiment, plant: Plant, state: TrueState | None) -
     return parts, offset
 
 
-def measured_pose(plant: Plant, robot: Robot, reads: int = START_READS) -> tuple[Array, Array] | None:
+def measured_pose(
+    plant: Plant, robot: Robot, calibration: MarkerCalibration, reads: int = START_READS
+) -> tuple[Array, Array] | None:
     """End position (3,) [m] and normal (3,) as the cameras see them, averaged; None if they do not see them.
 
     Args:
         plant: At rest.
-        robot: Says which nodes are the tip ring.
+        robot: Says which nodes are the tip ring, and roughly how its rings lie.
+        calibration: What is known of cameras and markers.
         reads: How many measurements are averaged.
     """
-    tip = ring_rows(robot.n_modules).index(robot.tip)
-    seen = [plant.read() for _ in range(reads)]
+    rows = ring_rows(robot.n_modules)
+    tip, shape = rows.index(robot.tip), robot.rest.q.reshape(-1, 3)[rows]
+    seen = [calibration.corrected(plant.read(), shape) for _ in range(reads)]
     rings = [m.nodes[tip : tip + 3].astype(float) for m in seen if m.valid[tip : tip + 3].all()]
     if not rings:
         return None

@@ -20,6 +20,7 @@ from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.controller.settings import ControllerSettings
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
+from tcrctl.experiment.calibration_file import with_calibration
 from tcrctl.experiment.criterion import CriterionText
 from tcrctl.experiment.plant_robot import plant_robot
 from tcrctl.experiment.summary import TASK, UNITS
@@ -217,6 +218,8 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     document, notes = without_former_keys(document, written, ExperimentSpec)
     spec, robot, robot_path = _validated(document, path.parent, problems)
     document.refuse(misfits(spec, robot))
+    estimator = with_calibration(document, spec.estimator, robot)
+    spec = spec.model_copy(update={"estimator": estimator})
     named = spec.plant.rig_file
     rig = None if named is None else load_rig(named, robot, path.parent)
     own = plant_robot(document, spec.plant, robot, robot_path)

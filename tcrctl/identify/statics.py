@@ -162,16 +162,39 @@ def _moved(robot: Robot, twins: Sequence[Twins], q: Array, drive: Array, *, keep
         drive: Its drives (m,) [m].
         keep_cables: False: cables pull with constant tension, whatever their length.
     """
+    columns = answers(
+        robot,
+        q,
+        drive,
+        -np.array([pair.force_slope(q, drive) for pair in twins]).T,
+        keep_cables=keep_cables,
+    )
+    return np.vstack([np.array([pair.base_slope for pair in twins]).T, columns])
+
+
+def answers(robot: Robot, q: Array, drive: Array, forces: Array, *, keep_cables: bool = True) -> Array:
+    """How the free nodes of a robot at rest give way to forces: A^-1 forces (12 n_modules, n) [m].
+
+    Args:
+        robot: The robot in equilibrium.
+        q: Its shape (3 n_nodes,) [m].
+        drive: Its drives (m,) [m].
+        forces: On the free coordinates (12 n_modules, n) [N].
+        keep_cables: False: cables pull with constant tension, whatever their length.
+
+    Raises:
+        NoEquilibriumError: If the tangent at ``q`` is not positive definite.
+    """
     ws = make_workspace(robot.model)
     assemble(robot.model, q, drive, static_load(robot.model, robot.weight), ws, np.bool_(True))
     if not keep_cables:
         ws.axial[:] = 0.0
     if linear.factor_shifted(ws.K, ws.U) != 0.0:
         raise NoEquilibriumError("a sensitivity (the tangent is not stable)", np.nan, 0.0, 0)
-    columns = np.ascontiguousarray(-np.array([pair.force_slope(q, drive) for pair in twins]).T)
+    columns = np.ascontiguousarray(forces)
     linear.couple(ws, ws.r)
     linear.solve_many(ws, columns)
-    return np.vstack([np.array([pair.base_slope for pair in twins]).T, columns])
+    return columns
 
 
 def _free(q: Array) -> Array:

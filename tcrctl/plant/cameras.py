@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from tcrctl.numerics.rotation import matrix_from_quaternion, quaternion_exp
 from tcrctl.plant.reality_settings import CameraSettings
 from tcrctl.robot.module import RING
+from tcrctl.robot.ring_axes import ring_frames
 from tcrctl.signals import Array
 
 Seen = Callable[[NDArray[np.bool_], float], NDArray[np.bool_]]
@@ -41,16 +42,6 @@ def directions(random: np.random.Generator, count: int) -> Array:
     """Draw unit vectors (count, 3), evenly on the sphere."""
     drawn = random.standard_normal((count, 3))
     return np.asarray(drawn / np.linalg.norm(drawn, axis=1, keepdims=True))
-
-
-def ring_frames(nodes: Array) -> Array:
-    """Return the axes of every ring (n_rings, 3, 3), one per row, from its nodes (3 n_rings, 3)."""
-    rings = nodes.reshape(-1, RING, 3)
-    x = rings[:, 1] - rings[:, 0]
-    x = x / np.linalg.norm(x, axis=1, keepdims=True)
-    z = np.cross(x, rings[:, 2] - rings[:, 0])
-    z = z / np.linalg.norm(z, axis=1, keepdims=True)
-    return np.stack([x, np.cross(z, x), z], axis=1)
 
 
 class CameraDraw(NamedTuple):

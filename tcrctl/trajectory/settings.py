@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from tcrctl.config.settings import Settings, quantity
 from tcrctl.trajectory.drive_settings import DrivesSettings
+from tcrctl.trajectory.excitation_settings import ExcitationSettings
 from tcrctl.trajectory.pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
 from tcrctl.trajectory.section import TrajectorySection
 from tcrctl.trajectory.values import NotNegative, Positive, Vector, check_one_of, not_empty
@@ -168,7 +169,13 @@ class HoldSettings(TrajectorySection):
 
 
 TrajectorySettings: TypeAlias = Annotated[
-    StrokesSettings | HoldSettings | WaypointsSettings | RevolutionSettings | ScanSettings | DrivesSettings,
+    StrokesSettings
+    | HoldSettings
+    | WaypointsSettings
+    | RevolutionSettings
+    | ScanSettings
+    | DrivesSettings
+    | ExcitationSettings,
     Field(discriminator="kind"),
 ]
 """Union of all kinds of trajectory, told apart by ``kind``; see :data:`tcrctl.trajectory.trajectory.KINDS`."""

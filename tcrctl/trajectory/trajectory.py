@@ -11,6 +11,8 @@ from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Reference
 from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.drives import build_drives
+from tcrctl.trajectory.excitation import build_excitation
+from tcrctl.trajectory.excitation_settings import ExcitationSettings
 from tcrctl.trajectory.hold import build_hold
 from tcrctl.trajectory.pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
 from tcrctl.trajectory.revolution import build_revolution
@@ -56,6 +58,7 @@ KINDS: Final[Mapping[str, tuple[type[TrajectorySection], Callable[[Any, Robot], 
     "revolution": (RevolutionSettings, build_revolution),
     "scan": (ScanSettings, build_scan),
     "drives": (DrivesSettings, build_drives),
+    "excitation": (ExcitationSettings, build_excitation),
 }
 
 NO_TARGETS: Targets = {}

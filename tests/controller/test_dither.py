@@ -10,13 +10,14 @@ import pytest
 
 from support.closed_loop import constant, ioc, resting
 from tcrctl.controller.controller import build_controller
-from tcrctl.controller.dither import MOST_CABLES, Dither, Dithered, signs
+from tcrctl.controller.dither import Dither, Dithered
 from tcrctl.controller.settings import DitherSettings
 from tcrctl.errors import SpecError
 from tcrctl.experiment.prepare import build_parts, build_plant, prepare
 from tcrctl.experiment.spec import load_spec
 from tcrctl.loop.loop import run_loop
 from tcrctl.robot import pose
+from tcrctl.robot.swing import MOST_CABLES, signs
 
 PERIOD = 0.01
 WAVE = 20  # periods of a wave of 5 Hz

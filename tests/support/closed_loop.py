@@ -35,10 +35,14 @@ def settings_of(kind, **changes):
 def ioc(prediction="multi_step", **changes) -> IocSettings:
     """Settings of a way to predict; keys of a multi-step prediction are changed where they belong."""
     chosen = dict(PREDICTIONS[prediction])
-    below = {key: changes.pop(key) for key in ("offset", "feedforward", "tension_gap") if key in changes}
+    below = {
+        key: changes.pop(key)
+        for key in ("offset", "feedforward", "tension_gap", "hole_drag")
+        if key in changes
+    }
     if below:
         chosen["prediction"] = {**chosen["prediction"], **below}
-    return IocSettings(kind="ioc", **{**chosen, **changes})
+    return IocSettings(kind="ioc", **{"dither": None, **chosen, **changes})
 
 
 def pose_settings(**changes) -> IocSettings:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from tcrctl.cli.rig.calibrate import calibrate
 from tcrctl.cli.rig.check import check
+from tcrctl.cli.rig.excite import excite
 from tcrctl.cli.rig.jog import jog
 from tcrctl.cli.rig.reset import reset
 from tcrctl.cli.rig.status import status
@@ -16,6 +17,7 @@ RIG_VERBS: dict[str, Callable[..., None]] = {
     "status": status,
     "calibrate": calibrate,
     "zero": zero,
+    "excite": excite,
     "jog": jog,
     "reset": reset,
 }

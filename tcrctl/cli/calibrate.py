@@ -1,0 +1,104 @@
+"""``tcrctl identify --calibrate LOG`` and ``--design SPEC``: self-calibration and the choice of its poses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tcrctl.identify.calibration.result import CalibrationResult, Errors
+    from tcrctl.identify.calibration.settings import SelfCalibrationSpec
+
+Say = Callable[[str], None]
+
+
+def calibrate_log(log: str, changes: Sequence[str], out: Path, say: Say, as_json: bool) -> int:
+    """Find robot, cameras and drives of a log; return the exit code."""
+    from tcrctl.experiment.run_folder import log_in
+    from tcrctl.identify.calibration.files import write_calibration
+    from tcrctl.identify.calibration.self_calibration import calibrate
+
+    found = calibrate(log_in(Path(log)), _assumed(changes), say)
+    robot, calibration = write_calibration(found, out)
+    if as_json:
+        print(json.dumps(found.result.as_json(robot, calibration)))
+    else:
+        _print(found.result)
+        rubs = " --set controller.dither.least_mm=2" if found.result.rubbing.rubs else ""
+        print(f"next run: tcrctl run SPEC --set estimator.calibration={calibration}{rubs}")
+        print(f"the robot as it was found, to look at or to try as robot: {robot}")
+    return 0 if found.result.fit.converged else 1
+
+
+def design_poses(name: str, changes: Sequence[str], out: Path, say: Say, as_json: bool) -> int:
+    """Choose the poses of an excitation and write it; return the exit code."""
+    from tcrctl.identify.calibration.designed import design_excitation
+
+    designed = design_excitation(name, _assumed(changes), out, say)
+    if as_json:
+        print(json.dumps(designed.as_json()))
+    else:
+        print(
+            f"{designed.poses} of {designed.candidates} poses: information {designed.information:.1f}, "
+            f"{designed.drawn:.1f} if drawn (log det over that of the prior)"
+        )
+        print(f"next: tcrctl run {designed.path}")
+    return 0
+
+
+def _assumed(changes: Sequence[str]) -> SelfCalibrationSpec:
+    from tcrctl.config import strict_yaml
+    from tcrctl.identify.calibration.settings import SelfCalibrationSpec
+
+    document = strict_yaml.placed("command line", {"kind": "self_calibration"}, {})
+    for assignment in changes:
+        document = strict_yaml.override(document, assignment)
+    return strict_yaml.validate(document, SelfCalibrationSpec)
+
+
+def _print(result: CalibrationResult) -> None:
+    print(f"{result.rests} rests, {len(result.unknowns)} unknowns, {result.fit.iterations} steps")
+    rows = (
+        ("as described", result.before),
+        ("found", result.after),
+        ("held out, as described", result.held_out_before),
+        ("held out, found from the others", result.held_out),
+    )
+    for what, errors in rows:
+        print(f"  {what:<32} {_distances(errors)}")
+    for name, entry in result.values().items():
+        if name.split(".")[0] in SHOWN:
+            print(f"  {name:<24} {entry['value']:>9.4f} +- {entry['std']:.4f} {_unit(entry)}")
+    if result.rubbing.coefficient.size:
+        said = ", ".join(f"{mu:.3f}" for mu in result.rubbing.coefficient)
+        print(f"  friction {said}")
+    print(f"  drives: lag {1e3 * result.drives.lag:.1f} ms, dead time {1e3 * result.drives.dead_time:.1f} ms")
+    for sentence in (*result.undetermined, *result.moving_together):
+        print(f"  not told: {sentence}")
+
+
+#: Groups that are printed one by one; all are in the report.
+SHOWN = (
+    "springs",
+    "density",
+    "tension",
+    "zeros",
+    "radius",
+    "tilt",
+    "backlash",
+    "frame_rotation",
+    "frame_translation",
+)
+
+
+def _distances(errors: Errors) -> str:
+    return (
+        f"markers {errors.markers:.2f} mm rms, end {errors.end_mean:.2f} mm on the mean, "
+        f"{errors.end_max:.2f} mm at most"
+    )
+
+
+def _unit(entry: dict[str, Any]) -> str:
+    return "" if entry["unit"] == "1" else str(entry["unit"])

@@ -1,0 +1,118 @@
+"""Maximum a posteriori: Gauss-Newton over all rests, what is loose at each of them marginalised.
+
+    min_x  Σ_k w_k (y_k - h_k(x))' C_k^-1 (y_k - h_k(x)) + x' Λ^-1 x,    C_k = σ² I + L_k L_k'
+
+with L_k what one standard deviation of each loose quantity does at rest k, and weights w_k that fall for rests that
+fit much worse than the others (Student's distribution). The posterior covariance is (J'C^-1J + Λ^-1)^-1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from tcrctl.identify.calibration.body import Body
+from tcrctl.identify.calibration.rests import Rests
+from tcrctl.identify.calibration.settings import SelfCalibrationSpec
+from tcrctl.identify.calibration.shapes import Shape, Shapes
+from tcrctl.identify.calibration.sight import Sight
+from tcrctl.numerics.rotation import matrix_from_quaternion, quaternion_exp
+from tcrctl.signals import Array
+
+#: Longest step, in prior standard deviations of one unknown.
+LONGEST: Final = 3.0
+#: A step below this, in the same measure, is the last one.
+SMALL: Final = 0.02
+#: Degrees of freedom of Student's distribution over rests.
+FREEDOM: Final = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """What was found.
+
+    Attributes:
+        x: Unknowns (n,).
+        covariance: Of them (n, n).
+        residual: Reported minus predicted markers (k, 3 n_markers) [m]; NaN where not seen.
+        weight: Of every rest (k,).
+        misfit: Mean square of the whitened residuals; 1 if rests are as loose as assumed.
+        iterations: Steps taken.
+        converged: The last step was small.
+    """
+
+    x: Array
+    covariance: Array
+    residual: Array
+    weight: Array
+    misfit: float
+    iterations: int
+    converged: bool
+
+
+class Calibrator:
+    """One robot, its rests and what is assumed of them."""
+
+    def __init__(self, body: Body, rests: Rests, spec: SelfCalibrationSpec) -> None:
+        self.body, self._rests, self._spec = body, rests, spec
+        self._sight = Sight(body.unknowns, body.robot.n_modules)
+        self._shapes = Shapes(body, rests, spec.rest)
+
+    def fit(self, start: Array | None = None) -> Fit:
+        """Find the unknowns.
+
+        Args:
+            start: Where to begin (n,); zeros if None.
+
+        Raises:
+            NoEquilibriumError: If the robot has no stable shape on the way.
+        """
+        prior = self.body.unknowns.prior
+        x = np.zeros(prior.size) if start is None else start.copy()
+        weight, step, k = np.ones(len(self._rests.t)), np.inf, 0
+        while True:
+            rows = [self._whitened(x, i, shape) for i, shape in enumerate(self._shapes.at(x))]
+            weight = self._weights([residual for _, residual, _ in rows])
+            J = np.vstack([np.sqrt(w) * slopes for w, (slopes, _, _) in zip(weight, rows, strict=True)])
+            r = np.concatenate([np.sqrt(w) * res for w, (_, res, _) in zip(weight, rows, strict=True)])
+            information = J.T @ J + np.eye(prior.size)
+            if step < SMALL or k == self._spec.iterations:
+                break
+            move = np.linalg.solve(information, J.T @ r - x / prior)
+            step = float(np.abs(move).max())
+            x, k = x + prior * move * (LONGEST / max(step, LONGEST)), k + 1
+        covariance = np.linalg.inv(information) * np.outer(prior, prior)
+        residual = np.array([raw for _, _, raw in rows])
+        return Fit(x, covariance, residual, weight, float(r @ r / max(r.size, 1)), k, step < SMALL)
+
+    def residual(self, x: Array) -> Array:
+        """Return reported minus predicted markers for unknowns x (k, 3 n_markers) [m]."""
+        return np.array([self._raw(x, i, shape)[0] for i, shape in enumerate(self._shapes.at(x))])
+
+    def _raw(self, x: Array, i: int, shape: Shape) -> tuple[Array, Array]:
+        predicted, slopes = self._sight.of(x, shape)
+        return self._rests.markers[i].ravel() - predicted, slopes
+
+    def _whitened(self, x: Array, i: int, shape: Shape) -> tuple[Array, Array, Array]:
+        """Slopes by x over its prior, and residuals, both in standard deviations; and the residuals as they are."""
+        raw, slopes = self._raw(x, i, shape)
+        seen = np.isfinite(raw)
+        turn = matrix_from_quaternion(quaternion_exp(self.body.unknowns.take(x, "frame_rotation")))
+        loose = self._sight.turned(turn, shape.loose)[seen]
+        root = np.linalg.cholesky(spread(loose, 1e-6 * self._spec.rest.noise_um))
+        white = np.linalg.solve(root, np.column_stack([slopes[seen] * self.body.unknowns.prior, raw[seen]]))
+        return white[:, :-1], white[:, -1], raw
+
+    @staticmethod
+    def _weights(residuals: list[Array]) -> Array:
+        """Weights (k,) of rests with whitened residuals, by their size against that of the middle one."""
+        size = np.array([float(r @ r) / max(r.size, 1) for r in residuals])
+        middle = max(float(np.median(size)), 1e-12)
+        return np.asarray(np.minimum(1.0, (FREEDOM + 1.0) / (FREEDOM + size / middle)))
+
+
+def spread(loose: Array, noise: float) -> Array:
+    """Return the covariance (n, n) of markers that are ``noise`` [m] apart, and loose (n, n_loose) [m]."""
+    return np.asarray(noise**2 * np.eye(loose.shape[0]) + loose @ loose.T)

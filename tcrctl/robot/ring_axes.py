@@ -1,0 +1,18 @@
+"""Axes of every ring, which turn with it: x from its first node to its second, z its normal."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcrctl.robot.module import RING
+from tcrctl.signals import Array
+
+
+def ring_frames(nodes: Array) -> Array:
+    """Return the axes of every ring (n_rings, 3, 3), one per row, from its nodes (3 n_rings, 3)."""
+    rings = nodes.reshape(-1, RING, 3)
+    x = rings[:, 1] - rings[:, 0]
+    x = x / np.linalg.norm(x, axis=1, keepdims=True)
+    z = np.cross(x, rings[:, 2] - rings[:, 0])
+    z = z / np.linalg.norm(z, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=1)
