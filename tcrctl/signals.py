@@ -8,12 +8,15 @@ plant -> Measurement -> estimator -> Estimate -> controller -> Command -> plant
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
+
+#: What is not told.
+NOT_TOLD: Final = np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,28 +89,28 @@ class Estimate:
         q: Node positions (3 n_nodes,) [m].
         v: Node velocities (3 n_nodes,) [m/s].
         drive: Drive lengths that the cables have now (m,) [m].
-        set_point: Drive lengths that were sent last (m,) [m].
-        arrived: Those sent a dead time of the drives ago (m,) [m].
-        lag: Time constant of the drives, as far as it is known [s].
         tension: Cable tensions of the model (m,) [N].
         position: End position (3,) [m].
         normal: End normal (3,).
         disturbance: Force that the model lacks, per node coordinate (3 n_nodes,) [N].
         converged: False if the estimator's own solve failed and the state was extrapolated.
+        set_point: Drive lengths that were sent last (m,) [m]; a log does not tell.
+        arrived: Those sent a dead time of the drives ago (m,) [m]; a log does not tell.
+        lag: Time constant of the drives, as far as it is known [s]; a log does not tell.
     """
 
     t: float
     q: Array
     v: Array
     drive: Array
-    set_point: Array
-    arrived: Array
-    lag: float
     tension: Array
     position: Array
     normal: Array
     disturbance: Array
     converged: bool
+    set_point: Array = NOT_TOLD
+    arrived: Array = NOT_TOLD
+    lag: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

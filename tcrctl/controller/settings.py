@@ -71,7 +71,7 @@ class DitherSettings(Settings):
     release_s: float = quantity("s", "time constant of its decay", 100.0, gt=0)
     filter_s: float = quantity("s", "time constant of the innovation's size", 0.1, gt=0)
     outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
-    start_mm: float = quantity("mm", "amplitude at the start, before anything is known", 0.35, ge=0, le=5)
+    start_mm: float = quantity("mm", "amplitude at the start, before anything is known", 0.3, ge=0, le=5)
     settle_s: float = quantity(
         "s", "time constant of its decay until the threshold is passed for the first time", 1.5, gt=0
     )

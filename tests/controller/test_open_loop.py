@@ -102,9 +102,7 @@ def test_the_duration_is_that_of_all_legs_and_rests(times):
 
 def estimate(drive):
     nothing = np.zeros(3)
-    return Estimate(
-        0.0, nothing, nothing, drive, drive, drive, 0.0, np.full(3, 5.0), nothing, nothing, nothing, True
-    )
+    return Estimate(0.0, nothing, nothing, drive, np.full(3, 5.0), nothing, nothing, nothing, True)
 
 
 def followed(robot, trajectory, steps, **settings):
