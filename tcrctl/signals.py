@@ -7,16 +7,17 @@ plant -> Measurement -> estimator -> Estimate -> controller -> Command -> plant
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final, TypeAlias
+from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 
-#: What is not told.
-NOT_TOLD: Final = np.zeros(0)
+
+def _not_told() -> Array:
+    return np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +109,8 @@ class Estimate:
     normal: Array
     disturbance: Array
     converged: bool
-    set_point: Array = NOT_TOLD
-    arrived: Array = NOT_TOLD
+    set_point: Array = field(default_factory=_not_told)
+    arrived: Array = field(default_factory=_not_told)
     lag: float = 0.0
 
 

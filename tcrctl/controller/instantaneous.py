@@ -100,7 +100,7 @@ class InstantaneousOptimalControl:
     def _cautious(self, awake: float) -> Weights:
         """Return the weights, with the W of a dithered robot as far as the dither is awake."""
         calm = self._weights.speed_change
-        return self._weights._replace(speed_change=calm * (self._shaken / calm) ** awake)
+        return self._weights._replace(speed_change=calm + awake**2 * (self._shaken - calm))
 
     def _expected(self, now: Array, forecast: Forecast, solution: Solution) -> Array:
         """Return the end position (3,) [m] one period from now, between now and the first instant."""

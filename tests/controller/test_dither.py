@@ -82,7 +82,7 @@ def test_the_wave_has_the_asked_amplitude_and_frequency_and_no_mean(tcr700):
 
 
 def test_it_grows_while_the_end_goes_elsewhere_and_releases_slowly(tcr700):
-    dither = running(tcr700, release_s=2.0, growth_1_s=5.0)
+    dither = running(tcr700, release_s=2.0, growth_1_s=5.0, start_mm=0.0)
     away = np.tile([2e-3, 0.0, 0.0], (300, 1))
     grown = watch(dither, away)
     assert np.all(np.diff(grown) >= 0.0)
