@@ -78,7 +78,7 @@ class DitherSettings(Settings):
     speed_change: float = quantity(
         "s2/m2",
         "weight of squared changes of drive speed while it runs, if that is the larger one",
-        6.0e3,
+        3.5e3,
         gt=0,
     )
     integral_gain_1_s: float = quantity(
