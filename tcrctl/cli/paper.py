@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import AsJson, SideBySide, unfolded
 
 if TYPE_CHECKING:
-    from tcrctl.paper.job import Job
+    from tcrctl.paper.job import Done, Job
     from tcrctl.paper.paper import Report
-    from tcrctl.paper.processes import Done
 
     Told = tuple[Callable[[Job], None], Callable[[Done], None]]
 
@@ -28,20 +26,17 @@ Only = Annotated[
     list[str] | None,
     typer.Option("--only", metavar="ROW", help="Only this row of the table; repeatable. See --rows."),
 ]
-Workers = Annotated[
-    int | None,
-    typer.Option("--jobs", "-j", metavar="N", min=1, help="Processes side by side.  [default: cores]"),
-]
 Names = Annotated[bool, typer.Option("--rows", help="Print the names of the rows and run nothing.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 _STYLES = {"goal": "green", "met": "green", "missed": "red", "failed": "red", "not run": "yellow"}
 
 
+@unfolded
 def paper(
     out: Out = Path("logs"),
     only: Only = None,
-    jobs: Workers = None,
+    side: SideBySide = SideBySide(),
     rows: Names = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -65,9 +60,8 @@ def paper(
         print(json.dumps([row.name for row in chosen]) if as_json else "\n".join(row.name for row in chosen))
         return
     check_writable(out)
-    workers = jobs or _cores()
     with _progress(len(jobs_of(chosen)), quiet=quiet) as (begun, ended):
-        report = run_paper(chosen, out=out, workers=workers, begun=begun, ended=ended)
+        report = run_paper(chosen, out=out, engine=side.engine, begun=begun, ended=ended)
     if report.reason:
         print(f"error: {report.reason}", file=sys.stderr)
     if as_json:
@@ -76,11 +70,6 @@ def paper(
         _print_table(report)
     if report.exit_code:
         raise typer.Exit(report.exit_code)
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from tcrctl.errors import RunInterruptedError, UnknownNameError
+from tcrctl.executors.engine import Engine
+from tcrctl.executors.outcomes import Crash, outcomes
 from tcrctl.experiment.provenance import versions
 from tcrctl.experiment.run_folder import RunFolder, make_run_folder
-from tcrctl.paper.job import Job
-from tcrctl.paper.processes import Done, Processes
+from tcrctl.loop.interruption import Interruption
+from tcrctl.paper.job import Done, Job, do
 from tcrctl.paper.report import BAD, Line, make_line, markdown
 from tcrctl.paper.row import Row
 from tcrctl.paper.table import ROWS
@@ -23,6 +25,10 @@ MARKDOWN: Final = "paper.md"
 JSON: Final = "paper.json"
 #: Load per core from which on measured times are not to be trusted.
 BUSY: Final = 0.5
+#: No job of the table takes nearly as long [s].
+TIME_LIMIT_S: Final = 900.0
+#: Runs whose time counts have a worker process of this computer, and the machine, for themselves.
+ALONE: Final = Engine(jobs=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +133,7 @@ def run_paper(
     rows: Sequence[Row],
     *,
     out: Path,
-    workers: int,
+    engine: Engine,
     begun: Callable[[Job], None],
     ended: Callable[[Done], None],
 ) -> Report:
@@ -136,9 +142,9 @@ def run_paper(
     Args:
         rows: What to measure.
         out: Where the report's folder is made.
-        workers: Processes that run side by side.
-        begun: Is told when a job begins; called in any thread.
-        ended: Is told what became of it; called in any thread.
+        engine: Where jobs run side by side.
+        begun: Is told when a job begins.
+        ended: Is told what became of it.
 
     Raises:
         DeviceError: If the folder cannot be made or written to.
@@ -146,19 +152,48 @@ def run_paper(
     folder, done, begin = make_run_folder(out, "paper"), dict[Job, Done](), time.monotonic()
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
 
-    def keep(item: Done) -> None:
-        done[item.job] = item
-        ended(item)
-
     interruption = None
     try:
-        Processes(folder.path, workers).run(jobs_of(rows), begun, keep)
+        for item in run_jobs(jobs_of(rows), folder.path, engine, begun):
+            done[item.job] = item
+            ended(item)
     except RunInterruptedError as error:
         interruption = error
     lines = tuple(make_line(row, done) for row in rows)
-    report = Report(folder.path, lines, workers, time.monotonic() - begin, load, interruption)
+    report = Report(folder.path, lines, engine.jobs, time.monotonic() - begin, load, interruption)
     _write(report, folder)
     return report
+
+
+def run_jobs(
+    jobs: Sequence[Job], folder: Path, engine: Engine, begun: Callable[[Job], None]
+) -> Iterator[Done]:
+    """Run jobs, first those that need the machine for themselves, one by one; yield what became of each.
+
+    Args:
+        jobs: What to run.
+        folder: Where the jobs write.
+        engine: Where the others run.
+        begun: Is told when a job begins.
+
+    Raises:
+        RunInterruptedError: If a signal came; running jobs were told to stop, and did or were killed.
+    """
+    alone = [(job, folder) for job in jobs if job.alone]
+    rest = [(job, folder) for job in jobs if not job.alone]
+    with Interruption() as interruption:
+        for some, where in ((alone, ALONE), (rest, engine)):
+            for (job, _), outcome in outcomes(
+                where,
+                do,
+                some,
+                check=interruption.check,
+                begun=lambda order: begun(order[0]),
+                deadline_s=TIME_LIMIT_S,
+            ):
+                if isinstance(outcome, Crash):
+                    outcome = Done(job, {}, outcome.reason, TIME_LIMIT_S, 1)
+                yield outcome
 
 
 def _write(report: Report, folder: RunFolder) -> None:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from tcrctl.errors import StoppedError
-from tcrctl.paper.job import Job
-from tcrctl.paper.processes import Done
+from tcrctl.paper.job import Done, Job
 from tcrctl.paper.row import Row, Verdict
 
 TITLES: Final = ("work", "paper", "must reach", "going to", "measured", "verdict")

@@ -1,45 +1,31 @@
-"""The comparison with the paper: rows as data, jobs as processes, verdicts, and what is kept when it is stopped."""
+"""The comparison with the paper: rows as data, jobs side by side, verdicts, and what is kept when it is stopped."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
-import sys
 import threading
 import time
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from support.jobs import Killed, Marked, Patient, Result
 from tcrctl.cli.app import main
 from tcrctl.errors import RunInterruptedError, UnknownNameError
+from tcrctl.executors.engine import Engine
 from tcrctl.experiment.spec import load_spec
 from tcrctl.paper import paper
 from tcrctl.paper.checks import CHECKS
-from tcrctl.paper.job import Check, Run
-from tcrctl.paper.paper import choose, jobs_of, run_paper
-from tcrctl.paper.processes import Done, Processes
+from tcrctl.paper.job import Check, Done, Run, do
+from tcrctl.paper.paper import choose, jobs_of, run_jobs, run_paper
 from tcrctl.paper.report import TITLES, make_line, markdown
 from tcrctl.paper.row import Row, found, total, worst
 from tcrctl.paper.table import ROWS
 from tcrctl.paper.table2 import CONFIGURATIONS, measured_displacements, model_displacements
-
-
-@dataclass(frozen=True)
-class Script:
-    """A job that runs a little program."""
-
-    label: str
-    program: str
-    alone: bool = False
-
-    def command(self, folder: Path) -> list[str]:
-        return [sys.executable, "-c", self.program, str(folder)]
 
 
 def nothing(item):
@@ -47,9 +33,7 @@ def nothing(item):
 
 
 def collected(jobs, folder, workers=2):
-    done = {}
-    Processes(folder, workers).run(jobs, nothing, lambda item: done.update({item.job: item}))
-    return done
+    return {item.job: item for item in run_jobs(jobs, folder, Engine(workers), nothing)}
 
 
 def row(job, must=1.0, goal=0.1, **changes):
@@ -86,7 +70,7 @@ def test_an_unknown_row_is_refused_with_those_there_are():
 @given(st.floats(0, 10), st.floats(0, 10), st.floats(0, 10), st.booleans())
 def test_a_better_value_never_gets_a_worse_verdict(value, other, span, at_least):
     must, goal = (5.0, 5.0 + span) if at_least else (5.0, 5.0 - span)
-    judged = row(Script("a", ""), must, goal, at_least=at_least)
+    judged = row(Result("a"), must, goal, at_least=at_least)
     ranks = {"missed": 0, "met": 1, "goal": 2}
     better, worse = (max, min) if at_least else (min, max)
     good, bad = better(value, other), worse(value, other)
@@ -95,10 +79,10 @@ def test_a_better_value_never_gets_a_worse_verdict(value, other, span, at_least)
 
 
 def test_without_a_bar_nothing_is_missed_and_without_a_value_it_is_a_failure():
-    assert row(Script("a", ""), None, None).verdict(99.0) == "shown"
-    assert row(Script("a", ""), None, 1.0).verdict(99.0) == "shown"
-    assert row(Script("a", ""), None, 1.0).verdict(0.5) == "goal"
-    assert row(Script("a", "")).verdict(None) == "failed"
+    assert row(Result("a"), None, None).verdict(99.0) == "shown"
+    assert row(Result("a"), None, 1.0).verdict(99.0) == "shown"
+    assert row(Result("a"), None, 1.0).verdict(0.5) == "goal"
+    assert row(Result("a")).verdict(None) == "failed"
 
 
 def test_values_are_found_through_maps_and_lists():
@@ -110,41 +94,24 @@ def test_values_are_found_through_maps_and_lists():
     assert worst("p.max")([result, {"p": None}]) is None
 
 
-#: Leaves a mark while it runs; waits for another one if it is to run beside it, else looks whether there is none.
-MARKED = """
-import json, sys, time
-from pathlib import Path
-folder, name, partner = Path(sys.argv[1]), {name!r}, {partner!r}
-(folder / name).touch()
-begin = time.monotonic()
-while partner and not (folder / partner).exists() and time.monotonic() - begin < 30.0:
-    time.sleep(0.01)
-time.sleep(0.2)
-print(json.dumps({{"x": sorted(path.name for path in folder.iterdir())}}))
-if not partner:
-    (folder / name).unlink()
-"""
-
-
+@pytest.mark.slow
 def test_jobs_run_side_by_side_but_those_alone_do_not(tmp_path):
-    partners = {"a": "", "b": "", "c": "d", "d": "c"}
-    jobs = [Script(n, MARKED.format(name=n, partner=p), alone=not p) for n, p in partners.items()]
+    jobs = [Marked("a", alone=True), Marked("b", alone=True), Marked("c", "d"), Marked("d", "c")]
     seen = {job.label: item.result["x"] for job, item in collected(jobs, tmp_path).items()}
     assert seen == {"a": ["a"], "b": ["b"], "c": ["c", "d"], "d": ["c", "d"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("program", "reason"),
+    ("job", "reason"),
     [
-        ('print(\'{"reason": "diverged"}\'); raise SystemExit(4)', "diverged"),
-        ("import sys; print('no such robot', file=sys.stderr); sys.exit(2)", "exit code 2: no such robot"),
-        ("raise SystemExit(0)", "exit code 0: it said nothing"),
-        ("print('not json')", "it said nothing"),
-        ("import os; os.kill(os.getpid(), 9)", "ended by SIGKILL"),
+        (Result("a", (("reason", "diverged"),), 4), "diverged"),
+        (Result("a", error="no such robot"), "no such robot"),
+        (Result("a"), "exit code 0"),
+        (Killed("a"), "its process ended by itself"),
     ],
 )
-def test_a_failed_job_is_a_row_with_its_reason(program, reason, tmp_path):
-    job = Script("a", program)
+def test_a_failed_job_is_a_row_with_its_reason(job, reason, tmp_path):
     line = make_line(row(job), collected([job], tmp_path))
     assert (line.verdict, line.value) == ("failed", None)
     assert line.reason.startswith("a: ")
@@ -152,21 +119,21 @@ def test_a_failed_job_is_a_row_with_its_reason(program, reason, tmp_path):
 
 
 def test_that_a_run_was_stopped_is_a_result_where_the_row_says_so(tmp_path):
-    job = Script("a", 'print(\'{"x": 70.0, "reason": "diverged"}\'); raise SystemExit(4)')
-    done = collected([job], tmp_path)
+    job = Result("a", (("x", 70.0), ("reason", "diverged")), 4)
+    done = {job: do((job, tmp_path))}
     may = make_line(row(job, None, None, text=lambda results: "diverges", may_stop=True), done)
     assert (may.verdict, may.value, may.measured, may.reason) == ("shown", 70.0, "diverges", "")
     assert make_line(row(job, None, None), done).verdict == "failed"
 
 
 def test_a_run_that_misses_its_own_criterion_is_still_measured(tmp_path):
-    job = Script("a", 'print(\'{"x": 0.5, "log": "l.mcap"}\'); raise SystemExit(3)')
-    line = make_line(row(job), collected([job], tmp_path))
+    job = Result("a", (("x", 0.5), ("log", "l.mcap")), 3)
+    line = make_line(row(job), {job: do((job, tmp_path))})
     assert (line.verdict, line.value, line.logs) == ("met", 0.5, ("l.mcap",))
 
 
 def test_the_markdown_table_has_a_cell_for_every_title():
-    job = Script("a", "")
+    job = Result("a")
     lines = [
         make_line(row(job), {job: Done(job, {"x": 0.5}, "", 1.0)}),
         make_line(row(job), {job: Done(job, {}, "a | b\nc", 1.0)}),
@@ -178,28 +145,18 @@ def test_the_markdown_table_has_a_cell_for_every_title():
     assert lines[2].verdict == "not run"
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_the_jobs_and_keeps_what_is_done(tmp_path):
-    quick = Script("quick", "print('{\"x\": 0.05}')", alone=True)
-    slow = Script(
-        "slow",
-        "import sys, time\ntry:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n"
-        "    open(sys.argv[1] + '/safe', 'w').close(); raise SystemExit(130)",
-    )
-    begun = threading.Event()
+    quick, slow = Result("quick", (("x", 0.05),), alone=True), Patient("slow")
 
     def press():
-        begun.wait(20.0)
-        time.sleep(0.5)
+        patience = time.monotonic() + 60.0
+        while not list(tmp_path.glob("*/running")) and time.monotonic() < patience:
+            time.sleep(0.05)
         os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=press).start()
-    report = run_paper(
-        [row(quick), row(slow)],
-        out=tmp_path,
-        workers=2,
-        begun=lambda job: begun.set() if job == slow else None,
-        ended=nothing,
-    )
+    report = run_paper([row(quick), row(slow)], out=tmp_path, engine=Engine(2), begun=nothing, ended=nothing)
     assert (report.exit_code, report.as_json()["status"]) == (130, "aborted")
     assert isinstance(report.interruption, RunInterruptedError)
     assert [line.verdict for line in report.lines] == ["goal", "not run"]
@@ -207,12 +164,9 @@ def test_ctrl_c_stops_the_jobs_and_keeps_what_is_done(tmp_path):
     assert json.loads((report.folder / "paper.json").read_text())["rows"][0]["measured"] == 0.05
 
 
+@pytest.mark.slow
 def test_the_command_prints_one_object_and_exits_with_3_if_a_bar_is_missed(tmp_path, capsys, monkeypatch):
-    jobs = [
-        Script("good", "print('{\"x\": 0.5}')"),
-        Script("bad", "print('{\"x\": 1.5}')"),
-        Script("ugly", "raise SystemExit(1)"),
-    ]
+    jobs = [Result("good", (("x", 0.5),)), Result("bad", (("x", 1.5),)), Result("ugly", code=1)]
     rows = tuple(
         Row(job.label, "work", "2.3", "mm", 1.0, 0.1, (job,), worst("x"), False, None) for job in jobs
     )
