@@ -31,11 +31,13 @@ from tcrctl.cli.run import run
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
 from tcrctl.cli.stability import stability
+from tcrctl.cli.sweep import sweep
 from tcrctl.cli.validate import validate
 from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,
+    "sweep": sweep,
     "identify": identify,
     "list": list_shipped,
     "show": show,

@@ -11,7 +11,7 @@ from tcrctl.cli.options import AsJson
 
 
 def list_shipped(as_json: AsJson = False) -> None:
-    """List the shipped experiments, identifications, robots and rigs.
+    """List the shipped experiments, identifications, studies, robots and rigs.
 
     Examples:
       tcrctl list
@@ -26,12 +26,14 @@ def list_shipped(as_json: AsJson = False) -> None:
         _entry(name, path, ("description", "robot", "source"))
         for name, path in shipped.identifications().items()
     ]
+    studies = [_entry(name, path, ("description",)) for name, path in shipped.studies().items()]
     robots = [_entry(name, path, ("description",)) for name, path in shipped.robots().items()]
     rigs = [_entry(name, path, ("description",)) for name, path in shipped.rigs().items()]
     if as_json:
         found = {
             "experiments": experiments,
             "identifications": identifications,
+            "studies": studies,
             "robots": robots,
             "rigs": rigs,
         }
@@ -42,6 +44,8 @@ def list_shipped(as_json: AsJson = False) -> None:
     _print_table(
         ("IDENTIFICATION", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), identifications
     )
+    print()
+    _print_table(("STUDY", "DESCRIPTION"), ("name", "description"), studies)
     print()
     _print_table(("ROBOT", "DESCRIPTION"), ("name", "description"), robots)
     print()

@@ -1,4 +1,4 @@
-"""``tcrctl show SPEC``: an experiment, identification or robot with every default filled in."""
+"""``tcrctl show SPEC``: an experiment, identification, study or robot with every default filled in."""
 
 from __future__ import annotations
 
@@ -39,5 +39,9 @@ def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
         from tcrctl.identify.loading import load_identification
 
         return load_identification(name, overrides).spec
+    if shipped.is_study(name):
+        from tcrctl.study.command_line import told_study
+
+        return told_study(name, overrides).spec
     loaded = load_spec(name, overrides)
     return with_draws(loaded.spec, len(loaded.robot.cables.routes))

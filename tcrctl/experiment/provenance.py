@@ -11,6 +11,7 @@ import platform
 import socket
 import sys
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -108,6 +109,7 @@ def processor() -> str:
     return named or platform.processor() or platform.machine()
 
 
+@cache
 def source_digest() -> str:
     """SHA-256 over the names and contents of all Python files of the package."""
     digest, package = hashlib.sha256(), Path(__file__).parents[1]

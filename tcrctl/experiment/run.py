@@ -12,14 +12,15 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedError, TcrctlError
+from tcrctl.errors import DeviceError, LogError, StoppedError, TcrctlError
 from tcrctl.experiment.metrics import Metrics
+from tcrctl.experiment.outcome import summary_of
 from tcrctl.experiment.prepare import Experiment, Notify, build_parts, build_plant, make_task, silent
-from tcrctl.experiment.provenance import attachments, resolved_text, start_metadata
+from tcrctl.experiment.provenance import attachments, resolved_text, start_metadata, versions
 from tcrctl.experiment.run_folder import (
     LOG,
     SUMMARY,
@@ -27,7 +28,7 @@ from tcrctl.experiment.run_folder import (
     check_writable,
     make_run_folder,
 )
-from tcrctl.experiment.summary import Summary, Verdict, judge
+from tcrctl.experiment.summary import Summary
 from tcrctl.log.file_names import RESOLVED, SPEC
 from tcrctl.log.geometry import CableRoute, LogGeometry
 from tcrctl.log.mcap_file import Opening, Tap
@@ -49,10 +50,15 @@ PATH_SPACING_S: Final = 0.1
 MOST_PATH_POINTS: Final = 1000
 
 Progress = Callable[[int, int], None]
+Check = Callable[[], None]
 
 
 def _no_progress(done: int, total: int) -> None:
     """Show nothing."""
+
+
+def no_check() -> None:
+    """Find nothing."""
 
 
 def run_experiment(
@@ -64,6 +70,7 @@ def run_experiment(
     notify: Notify = silent,
     progress: Progress = _no_progress,
     tap: Tap | None = None,
+    check: Check = no_check,
 ) -> Summary:
     """Run an experiment and record it.
 
@@ -77,6 +84,7 @@ def run_experiment(
         notify: Takes messages for the user.
         progress: Takes the number of steps done and their total, after every step.
         tap: Takes every message of the log, in the log's thread; see :class:`tcrctl.view.live.LiveView`.
+        check: Called before every step; what it raises ends the run.
 
     Returns:
         The result; also of a run that was stopped by a limit, a signal or a device.
@@ -87,7 +95,12 @@ def run_experiment(
     check_writable(out)
     realtime = realtime or experiment.paced
     with Interruption() as interruption:
-        pace = RealTime(experiment.period, interruption.check) if realtime else Unpaced(interruption.check)
+
+        def checked() -> None:
+            interruption.check()
+            check()
+
+        pace = RealTime(experiment.period, checked) if realtime else Unpaced(checked)
         journal = Journal(pace.time, notify)
         plant, state = build_plant(experiment, Session(pace.time, journal.report, confirmed))
         try:
@@ -172,7 +185,15 @@ def _recorded_run(
 
     with log:
         failure = _drive(experiment, replace(parts, record=record), plant, log)
-        summary = _summary(experiment, folder, metrics, {} if task is None else task.result(), failure)
+        summary = summary_of(
+            experiment,
+            folder.run_id,
+            metrics,
+            {} if task is None else task.result(),
+            failure,
+            folder.path / LOG,
+        )
+        summary = replace(summary, versions=versions())
         try:
             if failure is not None:
                 kind = "limit" if isinstance(failure, StoppedError) else "stop"
@@ -220,39 +241,3 @@ def _start_message(offset: float, approach: float) -> tuple[str, str]:
         )
     beside = f"the robot starts {1e3 * offset:.3f} mm beside the trajectory"
     return ("warning", f"{beside} and first goes there, {approach:.1f} s") if approach else ("info", beside)
-
-
-def _summary(
-    experiment: Experiment,
-    folder: RunFolder,
-    metrics: Metrics,
-    task: dict[str, Any],
-    failure: TcrctlError | None,
-) -> Summary:
-    spec = experiment.spec
-    summary = Summary(
-        run_id=folder.run_id,
-        spec=spec.name,
-        robot=experiment.robot.name,
-        plant=spec.plant.kind,
-        controller=spec.controller.kind,
-        status="success",
-        reason="",
-        exit_code=0,
-        measures=metrics.measures(),
-        criteria=(),
-        log=folder.path / LOG,
-        task=task,
-    )
-    verdicts = judge(spec.criteria, summary.as_json())
-    status, reason, exit_code = _outcome(failure, verdicts)
-    return replace(summary, criteria=verdicts, status=status, reason=reason, exit_code=exit_code)
-
-
-def _outcome(failure: TcrctlError | None, verdicts: tuple[Verdict, ...]) -> tuple[str, str, int]:
-    """Status, reason and exit code of a run."""
-    if failure is not None:
-        aborted = isinstance(failure, StoppedError | RunInterruptedError)
-        return "aborted" if aborted else "error", str(failure), failure.exit_code
-    missed = [str(verdict) for verdict in verdicts if not verdict.passed]
-    return ("failed", "; ".join(missed), 3) if missed else ("success", "", 0)

@@ -115,15 +115,18 @@ def test_overruns_are_steps_that_missed_their_period_by_the_clock():
 
 
 def summary(found, criteria=()):
-    made = Summary("id", "spec", "robot", "simulated", "ioc", "success", "", 0, found, (), Path("log.mcap"))
+    made = Summary(
+        "id", "spec", "robot", "simulated", "ioc", 0, (), "success", "", 0, found, (), Path("log.mcap")
+    )
     return replace(made, criteria=judge([parse_criterion(text) for text in criteria], made.as_json()))
 
 
 KEYS = [
-    "run_id", "spec", "robot", "plant", "controller", "status", "reason", "steps", "duration_s",
+    "run_id", "spec", "robot", "plant", "controller", "seed", "overrides", "status", "reason", "steps",
+    "duration_s",
     "position_error_mm", "x_error_mm", "orientation_error_deg", "theta_x_error_rad", "theta_y_error_rad",
     "tension_n", "saturated_fraction", "control_ms", "overruns", "inner_iterations", "unconverged_steps",
-    "criteria", "log", "task",
+    "criteria", "log", "task", "versions",
 ]  # fmt: skip
 
 
