@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,11 +22,17 @@ from tcrctl.experiment.spec import load_spec
 from tcrctl.paper import paper
 from tcrctl.paper.checks import CHECKS
 from tcrctl.paper.job import Check, Done, Run, do
+from tcrctl.paper.over_seeds import experiments_of, over_seeds
 from tcrctl.paper.paper import choose, jobs_of, run_jobs, run_paper
-from tcrctl.paper.report import TITLES, make_line, markdown
+from tcrctl.paper.report import TITLES, cells, make_line, markdown, titles
 from tcrctl.paper.row import Row, found, total, worst
 from tcrctl.paper.table import ROWS
 from tcrctl.paper.table2 import CONFIGURATIONS, measured_displacements, model_displacements
+from tcrctl.study.design import Cell
+from tcrctl.study.loading import load_study
+from tcrctl.study.plan import PlannedRun
+from tcrctl.study.row import Row as StudyRow
+from tcrctl.study.sweep import Done as StudyDone
 
 
 def nothing(item):
@@ -188,6 +195,47 @@ def test_the_command_prints_one_object_and_exits_with_3_if_a_bar_is_missed(tmp_p
     folders = list(tmp_path.iterdir())
     assert len(folders) == 2
     assert all({"paper.md", "paper.json"} <= {p.name for p in folder.iterdir()} for folder in folders)
+
+
+def plants(**by_name):
+    """A study with the largest errors of some experiments, plant by plant; None: stopped."""
+    runs, rows = [], []
+    for name, errors in by_name.items():
+        for seed, error in enumerate(errors, start=1):
+            address = f"{name}{seed}"
+            runs.append(PlannedRun(address, {"experiment": name}, seed, Cell(name, None, {})))
+            result = {"position_error_mm": {"max": error}}
+            rows.append(StudyRow(address, *(("success", "", result) if error else ("aborted", "diverged"))))
+    return StudyDone(tuple(runs), tuple(rows), 0, 1.0, 0, None)
+
+
+def test_a_row_over_plants_takes_the_worst_of_its_runs_on_each_and_counts_who_was_stopped():
+    letters = Row(
+        "l", "letters", "6.3", "mm", 3.0, 0.5, (Run("heart"), Run("letter_t")), worst("position_error_mm.max")
+    )
+    found = over_seeds(letters, plants(heart=[1.0, 5.0, 2.0, None], letter_t=[3.0, 1.0, 2.0, 1.0]))
+    assert (found.spread.n, found.spread.median, found.spread.worst) == (4, 4.0, float("inf"))
+    assert (found.stopped.count, found.as_json()["worst"]) == (1, None)
+    assert over_seeds(letters, plants(heart=[1.0])) is None
+
+
+def test_only_shipped_experiments_are_run_on_other_plants_and_never_for_their_time():
+    measured = {row.name for row in ROWS if experiments_of(row)}
+    assert {"letters", "helix", "laser_beam", "box_scan", "dynamic_10s"} <= measured
+    assert measured.isdisjoint({"letters_perfect", "static_10s", "table2", "control_p50", "kinematic"})
+    known = load_study("realistic").spec.experiments
+    assert {name for row in ROWS if row.must is not None for name in experiments_of(row)} <= {*known}
+
+
+def test_the_columns_of_many_plants_are_there_only_if_they_were_asked():
+    job = Result("a")
+    line = make_line(row(job), {job: Done(job, {"x": 0.5}, "", 1.0)})
+    letter = Row("t", "T", "6.3", "mm", 3.0, 0.5, (Run("letter_t"),), worst("position_error_mm.max"))
+    more = replace(line, plants=over_seeds(letter, plants(letter_t=[1.0, 2.0, 3.0])))
+    assert titles([line]) == TITLES
+    assert len(titles([line, more])) == len(TITLES) + 3
+    assert {len(texts) for texts in cells([line, more])} == {len(TITLES) + 3}
+    assert "| 2 [1, 3] | 3 | 0 of 3 |" in markdown([line, more], [])
 
 
 def test_the_displacements_of_table_2_keep_their_lengths_in_the_robots_frame(tcr700):
