@@ -4,8 +4,8 @@
 
 A study of short runs (a letter of some millimetres on a coarse plant) is run undisturbed with one process; then
 again, while the study itself and one of its workers, in turn, are killed with -9 at random moments, and started
-again until it ends by itself. With --dask the scheduler is a part of the study's process and dies with it. Ends with 1 if
-the tables differ or a run was done twice.
+again until it ends by itself. With --dask the scheduler is a part of the study's process and dies with it. Ends
+with 1 if the tables differ or a run was done twice.
 """
 
 from __future__ import annotations

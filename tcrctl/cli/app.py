@@ -28,6 +28,7 @@ from tcrctl.cli.replay import replay
 from tcrctl.cli.report import report
 from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.cli.run import run
+from tcrctl.cli.runs import runs
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
 from tcrctl.cli.stability import stability
@@ -38,6 +39,7 @@ from tcrctl.errors import DeviceError, SpecError, TcrctlError
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,
     "sweep": sweep,
+    "runs": runs,
     "identify": identify,
     "list": list_shipped,
     "show": show,

@@ -39,17 +39,17 @@ def list_shipped(as_json: AsJson = False) -> None:
         }
         print(json.dumps(found))
         return
-    _print_table(("EXPERIMENT", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), experiments)
+    print_columns(("EXPERIMENT", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), experiments)
     print()
-    _print_table(
+    print_columns(
         ("IDENTIFICATION", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), identifications
     )
     print()
-    _print_table(("STUDY", "DESCRIPTION"), ("name", "description"), studies)
+    print_columns(("STUDY", "DESCRIPTION"), ("name", "description"), studies)
     print()
-    _print_table(("ROBOT", "DESCRIPTION"), ("name", "description"), robots)
+    print_columns(("ROBOT", "DESCRIPTION"), ("name", "description"), robots)
     print()
-    _print_table(("RIG", "DESCRIPTION"), ("name", "description"), rigs)
+    print_columns(("RIG", "DESCRIPTION"), ("name", "description"), rigs)
 
 
 def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:
@@ -65,7 +65,14 @@ def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:
     return {"name": name, **{key: str(values.get(key) or "") for key in keys}, "path": str(path)}
 
 
-def _print_table(titles: Sequence[str], keys: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+def print_columns(titles: Sequence[str], keys: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+    """Print rows in columns as wide as they need.
+
+    Args:
+        titles: Of the columns.
+        keys: Of their values in the rows.
+        rows: Text by key.
+    """
     cells = [list(titles), *([row[key] for key in keys] for row in rows)]
     widths = [max(len(row[i]) for row in cells) for i in range(len(keys))]
     for row in cells:

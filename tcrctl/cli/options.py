@@ -13,6 +13,9 @@ import typer
 if TYPE_CHECKING:
     from tcrctl.executors.engine import Engine
 
+#: Variable of the environment that says where runs go.
+LOGS = "TCRCTL_LOGS"
+
 Spec: TypeAlias = Annotated[
     str, typer.Argument(metavar="SPEC", help="Shipped experiment, or path of a YAML file.")
 ]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcrctl.cli.options import AsJson, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, SideBySide, unfolded
 
 if TYPE_CHECKING:
     from tcrctl.paper.job import Done, Job
@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     Told = tuple[Callable[[Job], None], Callable[[Done], None]]
 
 Out = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Where the report's folder is made.", show_default=True)
+    Path,
+    typer.Option(
+        "--out", metavar="DIR", envvar=LOGS, help="Where the report's folder is made.", show_default=True
+    ),
 ]
 Only = Annotated[
     list[str] | None,

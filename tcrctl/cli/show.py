@@ -30,7 +30,8 @@ def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_jso
 
 def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
     from tcrctl.config import shipped
-    from tcrctl.experiment.spec import load_spec, with_draws
+    from tcrctl.experiment.again import load_experiment
+    from tcrctl.experiment.spec import with_draws
     from tcrctl.robot.description import load_robot
 
     if robot:
@@ -43,5 +44,5 @@ def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
         from tcrctl.study.command_line import told_study
 
         return told_study(name, overrides).spec
-    loaded = load_spec(name, overrides)
+    loaded = load_experiment(name, overrides)
     return with_draws(loaded.spec, len(loaded.robot.cables.routes))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, SideBySide, unfolded
 
 if TYPE_CHECKING:
     from tcrctl.study.loading import LoadedStudy
@@ -70,9 +70,9 @@ class Manner:
     ] = None
     logs: Annotated[str, typer.Option("--logs", help="Logs that are kept: all, failed or none.")] = "failed"
     retry: Annotated[bool, typer.Option("--retry", help="Do again what timed out or crashed.")] = False
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the study's folder is.")] = Path(
-        "logs"
-    )
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where the study's folder is.")
+    ] = Path("logs")
 
 
 @dataclass(frozen=True)

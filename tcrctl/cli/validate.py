@@ -49,7 +49,7 @@ def validate(
 def _load(name: str, overrides: Sequence[str], *, robot: bool) -> None:
     """Read a file of any kind with all its checks."""
     from tcrctl.config import shipped
-    from tcrctl.experiment.spec import load_spec
+    from tcrctl.experiment.again import load_experiment
     from tcrctl.robot.description import load_robot
 
     if robot:
@@ -64,4 +64,4 @@ def _load(name: str, overrides: Sequence[str], *, robot: bool) -> None:
 
         planned(told_study(name, overrides))
     else:
-        load_spec(name, overrides)
+        load_experiment(name, overrides)

@@ -20,7 +20,7 @@ from tcrctl.errors import DeviceError, LogError, StoppedError, TcrctlError
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.outcome import summary_of
 from tcrctl.experiment.prepare import Experiment, Notify, build_parts, build_plant, make_task, silent
-from tcrctl.experiment.provenance import attachments, resolved_text, start_metadata, versions
+from tcrctl.experiment.provenance import attachments, own_files, start_metadata, versions
 from tcrctl.experiment.run_folder import (
     LOG,
     SUMMARY,
@@ -29,7 +29,6 @@ from tcrctl.experiment.run_folder import (
     make_run_folder,
 )
 from tcrctl.experiment.summary import Summary
-from tcrctl.log.file_names import RESOLVED, SPEC
 from tcrctl.log.geometry import CableRoute, LogGeometry
 from tcrctl.log.mcap_file import Opening, Tap
 from tcrctl.log.writer import Flushing, LogWriter
@@ -125,8 +124,8 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap:
     """Write what is known before the first step; on failure the folder is as if it had never been."""
     spec, loaded = experiment.spec, experiment.loaded
     try:
-        folder.write(SPEC, loaded.given_text)
-        folder.write(RESOLVED, resolved_text(spec))
+        for name, content in own_files(loaded, spec).items():
+            folder.write(name, content)
         return LogWriter(
             folder.path / LOG,
             Opening(
