@@ -33,12 +33,14 @@ from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
 from tcrctl.cli.stability import stability
 from tcrctl.cli.sweep import sweep
+from tcrctl.cli.tune import tune
 from tcrctl.cli.validate import validate
 from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,
     "sweep": sweep,
+    "tune": tune,
     "runs": runs,
     "identify": identify,
     "list": list_shipped,

@@ -83,6 +83,9 @@ class Shown:
     parquet: Annotated[
         bool, typer.Option("--parquet", help="Write table.parquet too; needs 'tcrctl\\[parquet]'.")
     ] = False
+    figures: Annotated[
+        str | None, typer.Option("--figures", metavar="FORMAT", help="Draw figures too: png, pdf or svg.")
+    ] = None
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages.")] = False
 
 
@@ -141,6 +144,10 @@ def _check(manner: Manner, shown: Shown) -> None:
         raise UnknownNameError("choice of logs", manner.logs, ("all", "failed", "none"))
     if shown.form not in FORMATS:
         raise UnknownNameError("format", shown.form, FORMATS)
+    if shown.figures is not None:
+        from tcrctl.plots import check_names
+
+        check_names((), shown.figures)
 
 
 def _study(name: str, sets: list[str], plan: Plan, manner: Manner) -> LoadedStudy:
@@ -184,11 +191,18 @@ def _print_plan(study: LoadedStudy, runs: list[PlannedRun], out: Path, jobs: int
 
 
 def _finish(study: LoadedStudy, result: Done, out: Path, shown: Shown, *, as_json: bool) -> None:
+    from tcrctl.report.study import write_study_page
     from tcrctl.study.outputs import findings, write
     from tcrctl.study.sweep import folder_of
 
     folder, found = folder_of(study, out), findings(study.spec, result)
     write(found, folder, parquet=shown.parquet)
+    write_study_page(found, result, folder)
+    if shown.figures is not None:
+        from tcrctl.plots.study import save_study_figures
+        from tcrctl.study.groups import done
+
+        save_study_figures(study.spec, done(result.runs, result.rows), folder / "figures", shown.figures)
     reason = "" if result.interruption is None else str(result.interruption)
     if reason:
         print(f"error: {reason}; {result.missing} runs are missing: start again to go on", file=sys.stderr)
