@@ -35,6 +35,7 @@ from tcrctl.cli.stability import stability
 from tcrctl.cli.sweep import sweep
 from tcrctl.cli.tune import tune
 from tcrctl.cli.validate import validate
+from tcrctl.cli.workspace import workspace
 from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
 VERBS: dict[str, Callable[..., None]] = {
@@ -42,6 +43,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "sweep": sweep,
     "tune": tune,
     "runs": runs,
+    "workspace": workspace,
     "identify": identify,
     "list": list_shipped,
     "show": show,
