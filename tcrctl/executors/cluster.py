@@ -39,6 +39,7 @@ def cluster_workers(
             "--dask needs the package distributed, which is not installed",
             hint="pip install 'tcrctl[cluster]'",
         ) from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what ends badly is an error here, not a log
     if address is None:
         cluster = distributed.LocalCluster(
             n_workers=jobs,
