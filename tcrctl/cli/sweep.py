@@ -242,7 +242,7 @@ def _print_tables(found: Findings) -> None:
     from rich.table import Table
 
     console = Console()
-    for text in found.tables():
+    for text in found.tables(brief=True):
         table = Table(box=None)
         for title in text.head:
             table.add_column(escape(title), overflow="fold")

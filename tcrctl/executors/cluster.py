@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import importlib
 import logging
-from collections.abc import Callable, Iterator
+import os
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, Final
 
 from tcrctl.errors import DeviceError, InputError
@@ -15,6 +17,8 @@ from tcrctl.executors.workers import Workers
 AHEAD: Final = 2
 #: Time in which a scheduler has to answer [s].
 PATIENCE_S: Final = 10
+#: Variables that numbers or their speed depend on.
+_VARIABLES: Final = ("NUMBA_OPT", "OPENBLAS_NUM_THREADS")
 
 
 @contextmanager
@@ -59,7 +63,23 @@ def cluster_workers(
         yield _workers(client, warm)
 
 
+def environment() -> dict[str, str]:
+    """What libraries of this process read from the environment, and those of workers should too."""
+    return {name: os.environ[name] for name in _VARIABLES if name in os.environ}
+
+
+def set_environment(values: Mapping[str, str]) -> None:
+    """Set variables that are not set yet; for workers, before the numerical packages are loaded there.
+
+    Args:
+        values: By name.
+    """
+    for name, value in values.items():
+        os.environ.setdefault(name, value)
+
+
 def _workers(client: Any, warm: Callable[[], object] | None) -> Workers:
+    client.register_worker_callbacks(setup=partial(set_environment, environment()))
     threads = client.nthreads()
     if not threads:
         raise DeviceError("the Dask scheduler has no workers", hint="Start some: dask worker ADDRESS")

@@ -27,8 +27,8 @@ ABOVE: Final = (
 )  # fmt: skip
 #: Packages that kernels and numbers are made with.
 _NUMERIC: Final = ("llvmlite", "numba", "numpy", "scipy")
-#: Keys of an experiment that say nothing about how it runs.
-_WORDS: Final = ("description", "source")
+#: Keys of an experiment that say nothing about how it runs; the robot counts by what its file says.
+_WORDS: Final = ("description", "source", "robot")
 
 
 def address(loaded: LoadedSpec, seed: int, *, random_path: bool) -> str:
@@ -40,6 +40,8 @@ def address(loaded: LoadedSpec, seed: int, *, random_path: bool) -> str:
         random_path: Whether the seed draws its trajectory.
     """
     spec = with_draws(loaded.spec, len(loaded.robot.cables.routes), seed).model_dump(mode="json")
+    if loaded.plant_robot is not None:
+        spec["plant"]["robot"] = None  # the robot itself counts, not what its file is called
     content: dict[str, Any] = {
         "spec": {key: value for key, value in spec.items() if key not in _WORDS},
         "robot": loaded.robot.model_dump(mode="json"),

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Keys
@@ -15,6 +16,9 @@ from tcrctl.experiment.spec import LoadedSpec, load_spec
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.study.design import Cell
 from tcrctl.study.settings import CASE, StudySpec
+
+#: Keys whose values may be paths.
+_FILES = ("robot", "plant.robot")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +44,9 @@ class LoadedStudy:
         """
         name = cell.experiment
         changes = cell.changes(self.spec)
-        given = [f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in changes.items()]
+        given = [
+            f"{key}={json.dumps(self._beside(key, v), ensure_ascii=False)}" for key, v in changes.items()
+        ]
         try:
             loaded = load_spec(self.experiment_path(name), given)
         except SpecError as error:
@@ -63,6 +69,13 @@ class LoadedStudy:
         if shipped.is_study(path):
             self._refuse(name, f"{name} is a study; a study is made of experiments")
         return path
+
+    def _beside(self, key: str, value: Any) -> Any:
+        """A robot's file is looked for beside the study; everything else is as it is given."""
+        if key in _FILES and isinstance(value, str) and shipped.is_path(value):
+            path = self.folder / Path(value).expanduser()
+            return str(path.absolute()) if path.is_file() else value
+        return value
 
     def _refuse(self, experiment: str, message: str) -> None:
         index = self.spec.experiments.index(experiment)

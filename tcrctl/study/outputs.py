@@ -41,9 +41,9 @@ class Findings:
     groups: tuple[Group, ...]
     differences: tuple[Difference, ...]
 
-    def tables(self) -> list[TextTable]:
-        """Groups, and differences if there are any, as text."""
-        found = [group_table(self.groups)]
+    def tables(self, *, brief: bool = False) -> list[TextTable]:
+        """Groups, and differences if there are any, as text; brief: as in :func:`group_table`."""
+        found = [group_table(self.groups, brief=brief)]
         if self.spec.compare is not None and self.differences:
             found.append(
                 difference_table(self.differences, self.spec.compare.factor, self.spec.compare.against)

@@ -70,7 +70,7 @@ class Store:
         if address not in self._places:
             return None
         start, length = self._places[address]
-        return loads(os.pread(self._file, length, start))
+        return loads(_read(self._file, start, length))
 
     def add(self, row: Row) -> None:
         """Write a row.
@@ -113,6 +113,11 @@ class Store:
                 start += len(line)
 
 
+def _read(file: int, start: int, length: int) -> bytes:
+    os.lseek(file, start, os.SEEK_SET)
+    return os.read(file, length)
+
+
 def _take(lock: int, folder: Path) -> None:
     """Take the lock, or say who has it; where there are no locks, go on without."""
     try:
@@ -122,9 +127,9 @@ def _take(lock: int, folder: Path) -> None:
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        holder = os.pread(lock, 100, 0).decode(errors="replace")
+        holder = _read(lock, 0, 100).decode(errors="replace")
         who = json.loads(holder).get("pid") if holder.startswith("{") else "unknown"
         os.close(lock)
         raise DeviceError(f"{folder}: another process, {who}, is writing to this study") from None
     os.ftruncate(lock, 0)
-    os.pwrite(lock, json.dumps({"pid": os.getpid()}).encode(), 0)
+    os.write(lock, json.dumps({"pid": os.getpid()}).encode())

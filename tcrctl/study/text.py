@@ -62,11 +62,12 @@ def _for_latex(text: str) -> str:
     return "".join(_LATEX.get(letter, letter) for letter in text)
 
 
-def group_table(found: Sequence[Group]) -> TextTable:
-    """Return groups with two columns per measure: median with its interval and quartiles; worst.
+def group_table(found: Sequence[Group], *, brief: bool = False) -> TextTable:
+    """Return groups, one per row; per measure the median with its interval, the quartiles, the worst.
 
     Args:
         found: The groups of one study.
+        brief: Leave out the quartiles and the interval of the share, for narrow places.
     """
     if not found:
         return TextTable(("runs",), ())
@@ -74,13 +75,23 @@ def group_table(found: Sequence[Group]) -> TextTable:
         list(found[0].levels),
         [n for n in found[0].measures if any(g.measures[n] for g in found)],
     )
-    head = (*factors, "runs", *(t for name in measures for t in _titles(name)), "met all criteria", "stopped")
+    head = (
+        *factors,
+        "runs",
+        *(t for name in measures for t in _titles(name)[:: 2 if brief else 1]),
+        "met all criteria",
+        "stopped",
+    )
     rows = tuple(
         (
             *group.levels.values(),
             str(group.met.n),
-            *(text for name in measures for text in _spread_cells(group.measures[name])),
-            _share_cell(group.met),
+            *(
+                text
+                for name in measures
+                for text in _spread_cells(group.measures[name])[:: 2 if brief else 1]
+            ),
+            f"{group.met.count} of {group.met.n}" if brief else _share_cell(group.met),
             f"{group.stopped.count} of {group.stopped.n}",
         )
         for group in found

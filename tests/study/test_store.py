@@ -13,11 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from support.short_runs import ROOT, short_spec
-from support.studies import SOFT
+from support.studies import QUICK, SOFT, quick_study
 from tcrctl.errors import DeviceError
 from tcrctl.experiment.spec import load_spec
 from tcrctl.study import address as addressing
 from tcrctl.study.address import ABOVE, address
+from tcrctl.study.plan import planned
 from tcrctl.study.row import Row, loads
 from tcrctl.study.store import ROWS, Store
 
@@ -101,6 +102,7 @@ def test_a_full_disk_loses_no_row_that_was_there(tiny_filesystem):
 WRITER = """
 import sys
 from pathlib import Path
+from tcrctl.study.plan import planned
 from tcrctl.study.row import Row
 from tcrctl.study.store import Store
 with Store(Path(sys.argv[1])) as store:
@@ -154,6 +156,18 @@ def test_a_robot_of_the_same_name_with_other_numbers_has_another_address(tmp_pat
     robot.write_text(text.replace("youngs_modulus_mpa: 90", "youngs_modulus_mpa: 91"))
     assert robot.read_text() != text
     assert address(load_spec(str(spec)), 1, random_path=False) != before
+
+
+def test_a_robot_beside_the_study_is_found_and_counts_by_what_it_says_not_by_where_it_is(tmp_path):
+    text = load_spec("letter_t").robot_path.read_text()
+    found = []
+    for name in ("a", "b"):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / f"robot_{name}.yaml").write_text(text)
+        study = quick_study(folder, set={**QUICK, "robot": f"./robot_{name}.yaml"})
+        found += planned(study)
+    assert found[0].address == found[1].address == planned(quick_study(tmp_path))[0].address
 
 
 def test_what_the_address_leaves_out_stands_above_experiments_and_imports_point_down():
