@@ -48,7 +48,10 @@ def strip(lanes: Mapping[str, Sequence[Mark]]) -> str:
         parts.append(
             f'<text x="{LABEL - 12}" y="{y + 4:.1f}" text-anchor="end">{escape(_short(label))}</text>'
         )
-        parts += [*_box([place(v) for _, _, v in marks], y), *_marks(marks, [place(v) for *_, v in marks], y)]
+        values = [value for *_, value in marks]
+        left, right_side = np.quantile(values, (0.25, 0.75), method="inverted_cdf")
+        parts += _box(place(left), place(float(np.median(values))), place(right_side), y)
+        parts += _marks(marks, [place(value) for value in values], y)
     return "".join([*parts, "</svg>"])
 
 
@@ -56,8 +59,7 @@ def _short(label: str) -> str:
     return label if len(label) <= 50 else f"{label[:49]}…"
 
 
-def _box(places: Sequence[float], y: float) -> list[str]:
-    left, middle, right = np.quantile(places, (0.25, 0.5, 0.75), method="inverted_cdf")
+def _box(left: float, middle: float, right: float, y: float) -> list[str]:
     top, tall = y - 0.3 * LANE, 0.6 * LANE
     return [
         f'<rect x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" height="{tall:.1f}"/>',

@@ -108,10 +108,13 @@ def _anchor(address: str) -> str:
 
 def _runs(spec: StudySpec, runs: Sequence[Run], folder: Path) -> str:
     factors = list(dict.fromkeys(name for run, _ in runs for name in run.levels))
-    head = ("", *map(escape, factors), "seed", "status", *map(escape, spec.measures), "again, log")
+    measures = [
+        name for name in spec.measures if any(value_of(r, name) is not None for _, r in runs if r.finished)
+    ]
+    head = ("", *map(escape, factors), "seed", "status", *map(escape, measures), "again, log")
     lines = []
     for run, row in runs:
-        values = (value_of(row, name) for name in spec.measures)
+        values = (value_of(row, name) for name in measures)
         lines.append(
             (
                 f'<span id="{_anchor(run.address)}"></span>',
