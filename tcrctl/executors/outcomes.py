@@ -1,7 +1,7 @@
 """Work handed out piece by piece; what becomes of each, as it comes, also if its process dies.
 
 A process that ends by itself breaks a whole executor, and nobody says whose work it was. So everything that was in
-the air is done again, one piece at a time; what then ends its process a second time is known, and is a crash.
+the air is done again, one piece at a time; what then ends its process twice is known, and is a crash.
 """
 
 from __future__ import annotations
@@ -86,6 +86,7 @@ class _Work(Generic[T, R]):
     again: deque[T] = field(default_factory=deque)
     suspects: deque[T] = field(default_factory=deque)
     on_trial: bool = False
+    blamed: T | None = None
     flight: dict[Future[R], tuple[T, float]] = field(default_factory=dict)
 
     def until_broken(self, workers: Workers) -> Generator[tuple[T, R | Crash], None, bool]:
@@ -152,12 +153,16 @@ class _Work(Generic[T, R]):
         raise BrokenExecutor
 
     def _lost(self) -> Iterator[tuple[T, R | Crash]]:
-        """What was in the air is suspected; what was suspected before is found guilty."""
+        """What was in the air is suspected; what dies alone twice in a row is found guilty."""
         lost = [item for item, _ in self.flight.values()]
         self.flight.clear()
-        if self.on_trial:
-            self.on_trial = False
-            for item in lost:
-                yield item, Crash(_ENDED)
-        else:
+        if not self.on_trial:
             self.suspects.extend(lost)
+            return
+        self.on_trial = False
+        for item in lost:
+            if item is self.blamed:
+                yield item, Crash(_ENDED)
+            else:  # perhaps somebody else killed it
+                self.blamed = item
+                self.suspects.appendleft(item)

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from support import work
-from tcrctl.errors import RunInterruptedError
+from tcrctl.errors import DeviceError, InputError, RunInterruptedError
+from tcrctl.executors import cluster
 from tcrctl.executors.carried import carried
 from tcrctl.executors.engine import Engine, available_cores, physical_cores
 from tcrctl.executors.outcomes import Crash, outcomes
@@ -126,3 +127,28 @@ def test_what_is_carried_is_unpacked_once_per_process():
 
 def test_there_are_no_more_physical_than_logical_cores():
     assert 1 <= physical_cores() <= available_cores()
+
+
+def test_without_dask_the_message_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match="not installed") as raised, Engine(1, "local").open():
+        pass
+    assert "tcrctl[cluster]" in raised.value.hint
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_a_scheduler_that_is_not_there_is_a_device_error(monkeypatch):
+    monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
+    with (
+        pytest.raises(DeviceError, match="there is no Dask scheduler"),
+        Engine(1, "tcp://127.0.0.1:9").open(),
+    ):
+        pass
+
+
+def test_a_worker_keeps_its_own_environment_and_gets_what_it_lacks(monkeypatch):
+    monkeypatch.setenv("NUMBA_OPT", "3")
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    cluster.set_environment({"NUMBA_OPT": "1", "OPENBLAS_NUM_THREADS": "1"})
+    assert cluster.environment() == {"NUMBA_OPT": "3", "OPENBLAS_NUM_THREADS": "1"}

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -145,6 +146,16 @@ def test_the_tidy_table_has_a_value_for_every_column_and_all_digits():
     assert "0.30000000000000004" in table.csv()
     assert second["reason"] == "why"
     assert "control_ms.p50" not in table.columns
+
+
+def test_parquet_holds_the_table(tmp_path):
+    runs = [run(0, 0.5, task={"found": 2}), run(1, 1.0, task={"found": 2.5}), run(2, None, "b", "crashed")]
+    table = tidy(*zip(*runs, strict=True))
+    table.write_parquet(tmp_path / "t.parquet")
+    read = pyarrow.parquet.read_table(tmp_path / "t.parquet").to_pydict()
+    assert tuple(read) == table.columns
+    assert read["task.found"] == [2.0, 2.5, None]
+    assert read["position_error_mm.max"] == [0.5, 1.0, None]
 
 
 @pytest.mark.parametrize("form", ["csv", "latex", "markdown"])
