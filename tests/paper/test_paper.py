@@ -15,10 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from support.jobs import Killed, Marked, Patient, Result
+from support.studies import study_file
 from tcrctl.cli.app import main
 from tcrctl.errors import RunInterruptedError, UnknownNameError
 from tcrctl.executors.engine import Engine
 from tcrctl.experiment.spec import load_spec
+from tcrctl.paper import over_seeds as over_plants
 from tcrctl.paper import paper
 from tcrctl.paper.checks import CHECKS
 from tcrctl.paper.job import Check, Done, Run, do
@@ -257,3 +259,18 @@ def test_a_real_row_from_the_command_to_the_number(tmp_path, capsys):
     (line,) = json.loads(capsys.readouterr().out)["rows"]
     assert line["verdict"] == "met"
     assert line["measured"] == pytest.approx(6.80, abs=0.02)
+
+
+@pytest.mark.slow
+def test_the_command_runs_rows_on_other_plants_and_keeps_them_in_the_study(tmp_path, capsys, monkeypatch):
+    letter = Row("t", "T", "6.3", "mm", 3.0, 0.5, (Run("letter_t"),), worst("position_error_mm.max"))
+    monkeypatch.setattr(paper, "ROWS", (letter,))
+    monkeypatch.setattr(over_plants, "STUDY", str(study_file(tmp_path)))  # of short runs
+    order = ["paper", "--seeds", "3", "--jobs", "1", "--json", "--quiet", "--out", str(tmp_path)]
+    assert main(order) == 0
+    (line,) = json.loads(capsys.readouterr().out)["rows"]
+    plants = line["on_moderate_plants"]
+    assert (plants["n"], plants["stopped"]) == (3, 0)
+    assert plants["low"] <= plants["median"] <= plants["high"] <= plants["worst"]
+    rows = (tmp_path / "quick.study" / "rows.jsonl").read_bytes().splitlines()
+    assert len(rows) == 3
