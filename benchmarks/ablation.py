@@ -68,7 +68,7 @@ def simulate(order: tuple[str, str]) -> Summary | str:
 
 
 def cell(outcome: Summary | str | Crash) -> str:
-    """Largest and rms error, largest angle; or when it was stopped."""
+    """Return the largest and rms error, largest angle; or when it was stopped."""
     if not isinstance(outcome, Summary):
         return str(outcome)
     found = outcome.measures

@@ -24,12 +24,12 @@ def nothing(i: int) -> int:
 
 
 def memory_mb() -> float:
-    """Memory of this process, in which client and scheduler are."""
+    """Return the memory of this process, in which client and scheduler are."""
     return float(psutil.Process().memory_info().rss) / 1e6
 
 
 def at_once(tasks: int, jobs: int) -> tuple[float, float]:
-    """Milliseconds per task, and megabytes that client and scheduler grow by."""
+    """Return milliseconds per task, and megabytes that client and scheduler grow by."""
     cluster: Any = LocalCluster(n_workers=jobs, threads_per_worker=1, dashboard_address=None)
     with cluster, Client(cluster) as client, client.get_executor(pure=False) as executor:
         executor.submit(nothing, 0).result()
@@ -42,8 +42,10 @@ def at_once(tasks: int, jobs: int) -> tuple[float, float]:
 
 
 def as_they_come(tasks: int, jobs: int) -> tuple[float, float]:
-    """The same through the seam."""
-    most, before, begin = 0.0, 0.0, 0.0
+    """Return the same through the seam."""
+    most = 0.0
+    before = 0.0
+    begin = 0.0
     for done, _ in enumerate(outcomes(Engine(jobs, "local"), nothing, range(tasks + 1))):
         if done == 0:
             before, begin = memory_mb(), time.perf_counter()

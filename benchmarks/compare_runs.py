@@ -36,7 +36,7 @@ def numbers(found: Any, path: str = "") -> Iterator[tuple[str, str]]:
 
 
 def differences(before: Any, after: Any) -> list[str]:
-    """Sentences about what is not the same."""
+    """Return sentences about what is not the same."""
     old, new = dict(numbers(before)), dict(numbers(after))
     return [
         f"{path}: {old.get(path, 'absent')} -> {new.get(path, 'absent')}"
@@ -46,7 +46,7 @@ def differences(before: Any, after: Any) -> list[str]:
 
 
 def read(folder: Path) -> dict[str, Any]:
-    """Results by experiment."""
+    """Return the results by experiment."""
     return {path.stem: json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))}
 
 

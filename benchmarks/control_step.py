@@ -43,7 +43,7 @@ def circle(robot: Robot, t: Array) -> tuple[Array, Array]:
 
 
 def measure(seconds: float) -> tuple[Array, Array]:
-    """Times of estimator and controller [ms], one per step."""
+    """Return the times of estimator and controller [ms], one per step."""
     robot = build_robot(load_robot("tcr700"))
     plant_settings = SimulatedSettings(
         kind="simulated",

@@ -28,7 +28,7 @@ REST_S, TURN_S = 30.0, 25.0
 
 
 def resident_mb() -> float:
-    """Memory of this process in RAM [MB]; Linux only."""
+    """Return the memory of this process in RAM [MB]; Linux only."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from tcr_hardware.emulators import motive_encoder as encoder
 from tcr_hardware.emulators.motive_faults import MotiveFaults
-from tcr_hardware.emulators.motive_scene import Scene
+from tcr_hardware.emulators.motive_markers import TrackedMarkers
 from tcr_hardware.markers import MarkerMap, NodeMarker
 from tcr_hardware.natnet.frame_decoder import decode_frame
 from tcr_hardware.natnet.marker_frame import MarkerFrame
@@ -28,7 +28,7 @@ NAMES = [f"b{k % 6}.n{k // 6}" for k in range(50)]
 
 
 def timed(function, repeat: int) -> np.ndarray:
-    """Durations of single calls [us]."""
+    """Return the durations of single calls [us]."""
     times = np.empty(repeat)
     for k in range(repeat):
         start = time.perf_counter()
@@ -42,16 +42,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     repeat = parser.add_argument("--repeat", type=int, default=2000) and parser.parse_args().repeat
     positions = np.random.default_rng(0).normal(size=(50, 3))
-    scene = Scene(NAMES, positions)
-    view = scene.view(positions, MotiveFaults())
+    tracked = TrackedMarkers(NAMES, positions)
+    view = tracked.view(positions, MotiveFaults())
     markers = MarkerMap([NodeMarker(name, label=name) for name in NAMES], positions)
     table = Table(
         "version", "bytes", "decode p50 us", "p99 us", "+ marker map p50 us", title="one NatNet frame"
     )
     for text in VERSIONS:
         version = Version.parse(text)
-        payload = encoder.frame(version, encoder.Stamp(1, 0.5, 1, 2, 3, 1e-3, 0), scene, view)
-        models = decode_models(encoder.models(version, scene), version)
+        payload = encoder.frame(version, encoder.Stamp(1, 0.5, 1, 2, 3, 1e-3, 0), tracked, view)
+        models = decode_models(encoder.models(version, tracked), version)
 
         def located(payload=payload, version=version, models=models) -> None:
             frame = MarkerFrame(1, 0, 0.0, 0.0, None, decode_frame(payload, version), models)

@@ -23,7 +23,7 @@ from rich.table import Table
 
 from tcr_hardware.emulators import motive_encoder as encoder
 from tcr_hardware.emulators.motive_faults import MotiveFaults
-from tcr_hardware.emulators.motive_scene import Scene
+from tcr_hardware.emulators.motive_markers import TrackedMarkers
 from tcr_hardware.natnet.errors import MalformedPacketError
 from tcr_hardware.natnet.frame_decoder import decode_frame
 from tcr_hardware.natnet.model_decoder import decode_models
@@ -36,17 +36,17 @@ COUNTS = (-1, -(2**31), 2**31 - 1, 2**16, 1_000, 1_001, 5_461, 255)
 
 
 def samples() -> list[tuple[Version, int, bytes]]:
-    """Good packets: version, message, payload."""
+    """Return good packets: version, message, payload."""
     names = [f"b{k % 6}.n{k // 6}" for k in range(50)]
     positions = np.random.default_rng(0).normal(size=(50, 3))
-    scene = Scene(names, positions)
+    tracked = TrackedMarkers(names, positions)
     unnamed = MotiveFaults(unlabelled=True)
     found = []
     for version in VERSIONS:
         stamp = encoder.Stamp(1, 0.5, 1, 2, 3, 1e-3, 0)
-        views = [scene.view(positions, faults) for faults in (MotiveFaults(), unnamed)]
-        found += [(Version(*version), 7, encoder.frame(version, stamp, scene, view)) for view in views]
-        found.append((Version(*version), 5, encoder.models(version, scene)))
+        views = [tracked.view(positions, faults) for faults in (MotiveFaults(), unnamed)]
+        found += [(Version(*version), 7, encoder.frame(version, stamp, tracked, view)) for view in views]
+        found.append((Version(*version), 5, encoder.models(version, tracked)))
         info = encoder.server_info("Motive", version, 10_000_000, 1511, False, "239.255.42.99")
         found.append((Version(*version), 1, info))
     found.append((Version(4, 1), 13, struct.pack("<QQ", 1, 2)))
@@ -55,7 +55,7 @@ def samples() -> list[tuple[Version, int, bytes]]:
 
 
 def mutated(payload: bytes, rng: random.Random) -> bytes:
-    """A damaged copy."""
+    """Return a damaged copy."""
     out = bytearray(payload)
     for _ in range(rng.randint(1, 3)):
         at = rng.randrange(len(out)) if out else 0
@@ -86,7 +86,7 @@ def decode(version: Version, message: int, payload: bytes) -> None:
 
 
 def outcome_of(version: Version, message: int, payload: bytes) -> tuple[str, float]:
-    """What became of a payload, and the processor time [s]."""
+    """Decode a payload; return what became of it, and the processor time [s]."""
     start = time.thread_time()
     try:
         decode(version, message, payload)
@@ -99,7 +99,7 @@ def outcome_of(version: Version, message: int, payload: bytes) -> tuple[str, flo
 
 
 def attack(packets: int, seed: int) -> tuple[collections.Counter[str], float, int]:
-    """Outcomes, worst time [s], and, while memory is traced, the largest allocation of a decoder [byte]."""
+    """Return outcomes, worst time [s], and, while memory is traced, the largest allocation of a decoder [byte]."""
     rng, good, sessions = random.Random(seed), samples(), {}
     outcomes: collections.Counter[str] = collections.Counter()
     worst, largest = 0.0, 0

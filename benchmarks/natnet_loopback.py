@@ -35,7 +35,7 @@ def serve(settings: MotiveSettings, ports, stop) -> None:
 
 
 def receive(client: NatNetClient, seconds: float) -> list:
-    """All frames of some seconds."""
+    """Return all frames of some seconds."""
     frames, end = [], time.monotonic() + seconds
     while time.monotonic() < end:
         time.sleep(0.5)

@@ -44,20 +44,20 @@ def speeds(t: float, m: int) -> Array:
     return ease * REACH * rate * np.cos(rate * t + np.arange(m) * np.pi / 3.0)
 
 
-def run(robot: Robot, seconds: float, step: float, friction: float | None = None) -> tuple[Array, Array]:
-    """Wall time of every step [us] and its Newton iterations."""
+def run(robot: Robot, seconds: float, h: float, friction: float | None = None) -> tuple[Array, Array]:
+    """Return the wall time of every step [us] and its Newton iterations."""
     model, m, slip = robot.model, robot.n_cables, None
     if friction is not None:
         holes = hole_friction(FrictionSettings(coefficient=friction), model.first_hole)
         slip = dynamics.unworn(model, robot.rest.q, np.zeros(m), robot.rest.tension, holes)
     state = dynamics.rest_state(robot.rest.q, np.zeros(m), slip)
     work, scratch = make_workspace(model, rubbing=slip is not None), dynamics.make_scratch(model)
-    times, iterations, rule = [], [], dynamics.Rule(step, RHO)
-    dynamics.advance(model, state, np.zeros(m), step, rule, robot.weight, work, scratch)  # compile
-    for k in range(round(seconds / step)):
-        speed = speeds(k * step, m)
+    times, iterations, rule = [], [], dynamics.Rule(h, RHO)
+    dynamics.advance(model, state, np.zeros(m), h, rule, robot.weight, work, scratch)  # compile
+    for k in range(round(seconds / h)):
+        speed = speeds(k * h, m)
         begin = time.perf_counter()
-        done = dynamics.advance(model, state, speed, step, rule, robot.weight, work, scratch)
+        done = dynamics.advance(model, state, speed, h, rule, robot.weight, work, scratch)
         times.append(1e6 * (time.perf_counter() - begin))
         iterations.append(done[3])
         if not done[0]:
@@ -65,21 +65,21 @@ def run(robot: Robot, seconds: float, step: float, friction: float | None = None
     return np.array(times), np.array(iterations)
 
 
-def realistic(robot: Robot, seconds: float, step: float) -> float:
-    """Wall time of a step [us] of a plant that is all of *moderate*, its periods of 50 ms as a whole."""
-    ideal = SimulatedSettings(kind="simulated", step_ms=1e3 * step, realistic="moderate", scatter=None)
+def realistic(robot: Robot, seconds: float, h: float) -> float:
+    """Return the wall time of a step [us] of a plant that is all of *moderate*, its periods of 50 ms as a whole."""
+    ideal = SimulatedSettings(kind="simulated", step_ms=1e3 * h, realistic="moderate", scatter=None)
     plant = SimulatedPlant(as_drawn(ideal, robot.n_cables, 1), robot, 0.05, 1)
     times = []
     for k in range(round(seconds / 0.05)):
         command = Command(speeds(0.05 * k, robot.n_cables), np.zeros(robot.n_cables))
         begin = time.perf_counter()
         plant.write(command)
-        times.append(1e6 * (time.perf_counter() - begin) * step / 0.05)
+        times.append(1e6 * (time.perf_counter() - begin) * h / 0.05)
     return float(np.median(times))
 
 
 def solves(robot: Robot, step: float, repeats: int = 300) -> tuple[float, float, float]:
-    """Median time [us] of the structured and of the dense solve, and the largest relative difference."""
+    """Return the median time [us] of the structured and of the dense solve, and the largest relative difference."""
     model, m = robot.model, robot.n_cables
     nodal = np.zeros((4, robot.rest.q.size))
     nodal[FORCE] = robot.weight

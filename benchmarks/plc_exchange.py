@@ -69,7 +69,7 @@ def arm(bus: PlcBus) -> None:
 
 
 def host(address: tuple[str, int], pipe: Connection) -> None:
-    """A host that follows a ramp until it is killed."""
+    """Follow a ramp as a host, until killed."""
     with PlcBus(BusSettings(TcpLink(*address))) as bus:
         arm(bus)
         at = list(bus.info.status.positions_um)

@@ -24,7 +24,7 @@ from tcrctl.study.sweep import sweep
 
 
 def memory_mb() -> float:
-    """Memory of this process."""
+    """Return the memory of this process."""
     status = Path("/proc/self/status").read_text()
     return float(status.partition("VmRSS:")[2].split()[0]) / 1e3
 

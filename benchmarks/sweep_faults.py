@@ -36,7 +36,7 @@ def command(out: Path, runs: int, *more: str) -> list[str]:
 
 
 def workers(parent: int) -> list[int]:
-    """Processes below a process that were spawned as workers, at any depth."""
+    """Return the processes below a process that were spawned as workers, at any depth."""
     found = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -65,7 +65,9 @@ def main() -> int:
     told = parser.parse_args()
     os.environ["PYTHONPATH"] = f"{ROOT}:{ROOT / 'hardware'}"
     engine = ("--jobs", str(told.jobs), *(("--dask", "local") if told.dask else ()))
-    dice, kills, starts = random.Random(told.kills), [], 0
+    dice = random.Random(told.kills)
+    kills = []
+    starts = 0
     with tempfile.TemporaryDirectory() as folder:
         quiet, loud = Path(folder) / "quiet", Path(folder) / "loud"
         subprocess.run(command(quiet, told.runs, "--jobs", "1"), check=True, stdout=subprocess.DEVNULL)

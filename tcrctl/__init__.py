@@ -20,8 +20,10 @@ name              meaning                                                     sh
 ``theta_x, _y``   end orientation angles of eq. (45), both 0 at rest          ()                rad
 ``period``        control period η                                            ()                s
 ``horizon``       prediction horizon of the controller                        ()                s
-``step``, h       internal time step of an integrator                         ()                s
+``h``             internal step: time step of an integrator, at most a period ()                s
+``step``          control step: one round of the loop, one record of a log
 ``k``             index of the control step, 0 .. n-1
+``n_free``        free coordinates: all of ``q`` but those of the fixed base
 ================  ==========================================================  ================  =======
 
 World frame: right-handed, z up, origin in the centre of the base ring; the robot hangs towards -z.
@@ -29,6 +31,11 @@ Nodes: module 0 is the fixed base; module i (1 .. n_modules) hangs below module 
 four nodes, ``n1 n2 n3`` on its ring (counter-clockwise seen from +z) and ``apex``, so that node j of
 module i is row ``4 i + j``. In files a node is written ``base.n1``, ``m7.apex``. What
 follows from that kind of module is in :mod:`tcrctl.robot.module` and nowhere else.
+Frame: what the cameras send at one instant; a coordinate frame is called so, or by its name (world frame,
+rig frame). Bench: the place with cameras, drives and robots; rig: the file that describes it, and the plant
+that it makes. Problem: what is wrong in a file. Sight: what the camera of a task sees. State: q, v and what
+else an integrator needs; what the supervisor is in is a safety state. Session: of the cameras' server, from
+one start to the next.
 Equation numbers refer to the paper, key [TCR] in REFERENCES.md.
 """
 

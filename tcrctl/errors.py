@@ -78,7 +78,9 @@ class UnknownNameError(InputError):
         close = difflib.get_close_matches(name, allowed, n=1)
         hint = f"Did you mean {close[0]}?" if close else ""
         super().__init__(f"there is no {kind} named {name!r}; known: {', '.join(allowed)}", hint=hint)
-        self.kind, self.name, self.allowed = kind, name, tuple(allowed)
+        self.kind = kind
+        self.name = name
+        self.allowed = tuple(allowed)
 
 
 class InfeasibleError(InputError):
@@ -99,7 +101,11 @@ class InfeasibleError(InputError):
             f"infeasible at t = {time:.3f} s: {quantity} is {value:.4g} {unit}, limit {limit:.4g} {unit}",
             hint=hint,
         )
-        self.time, self.quantity, self.value, self.limit, self.unit = time, quantity, value, limit, unit
+        self.time = time
+        self.quantity = quantity
+        self.value = value
+        self.limit = limit
+        self.unit = unit
 
 
 class NoEquilibriumError(InputError):
@@ -118,7 +124,9 @@ class NoEquilibriumError(InputError):
             hint="Check spring stiffness, initial tension and cone height; "
             "a slack or buckled robot has no stable shape.",
         )
-        self.residual, self.tolerance, self.iterations = residual, tolerance, iterations
+        self.residual = residual
+        self.tolerance = tolerance
+        self.iterations = iterations
 
 
 class StoppedError(TcrctlError):
@@ -150,7 +158,10 @@ class SafetyLimitError(StoppedError):
         super().__init__(
             f"safety stop at step {step}: {quantity} is {value:.4g}{of}, limit {limit:.4g}{of}", step
         )
-        self.quantity, self.value, self.limit, self.unit = quantity, value, limit, unit
+        self.quantity = quantity
+        self.value = value
+        self.limit = limit
+        self.unit = unit
 
 
 class TimeLimitError(StoppedError):
@@ -166,20 +177,22 @@ class TimeLimitError(StoppedError):
 
 
 class DivergenceError(StoppedError):
-    """The simulated plant could not complete a time step.
+    """The simulated plant could not complete an internal step.
 
     Attributes:
         time: Simulated time [s].
         residual: Largest remaining nodal force [N].
-        smallest_step: Smallest time step that was tried [s].
+        smallest_h: Smallest internal step that was tried [s].
     """
 
-    def __init__(self, time: float, residual: float, smallest_step: float) -> None:
+    def __init__(self, time: float, residual: float, smallest_h: float) -> None:
         super().__init__(
             f"the simulated plant did not converge at t = {time:.4f} s: residual {residual:.3g} N "
-            f"with sub-steps down to {smallest_step:.2g} s"
+            f"with sub-steps down to {smallest_h:.2g} s"
         )
-        self.time, self.residual, self.smallest_step = time, residual, smallest_step
+        self.time = time
+        self.residual = residual
+        self.smallest_h = smallest_h
 
 
 class RunInterruptedError(TcrctlError):

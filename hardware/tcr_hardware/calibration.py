@@ -29,7 +29,10 @@ class CalibrationError(HardwareError):
         super().__init__(
             f"calibration refused: {quantity} is {value:.4g} {unit}, limit {limit:.4g} {unit}", hint=hint
         )
-        self.quantity, self.value, self.limit, self.unit = quantity, value, limit, unit
+        self.quantity = quantity
+        self.value = value
+        self.limit = limit
+        self.unit = unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +51,7 @@ class MarkerMean:
 
 
 @dataclass(frozen=True, slots=True)
-class Calibration:
+class CalibrationResult:
     """A transform and how well it fits.
 
     Attributes:
@@ -86,7 +89,7 @@ def calibrate(
     level: bool = False,
     max_residual_m: float = 0.002,
     max_tilt_deg: float = 10.0,
-) -> Calibration:
+) -> CalibrationResult:
     """Fit the rigid transform that takes ``measured`` to ``known``, in the least-squares sense.
 
     Three markers of the base ring, 60 mm apart, fix the direction of the robot's axis only to about 1 mm per 0.1 mm
@@ -127,7 +130,7 @@ def calibrate(
         )
     transform = RigidTransform(rotation, translation, scale_m)
     rms = float(np.sqrt((distances**2).mean()))
-    return Calibration(transform, rms, float(distances.max()), tilt, scale_error)
+    return CalibrationResult(transform, rms, float(distances.max()), tilt, scale_error)
 
 
 def _check_spread(places: Array) -> None:
@@ -142,7 +145,7 @@ def _check_spread(places: Array) -> None:
 
 
 def _check_scale(points: Array, places: Array) -> float:
-    """Relative error of distances; a wrong unit shows as a power of ten."""
+    """Return the relative error of distances; a wrong unit shows as a power of ten."""
     sizes = [np.linalg.norm(each - each.mean(axis=0)) for each in (points, places)]
     error = float(sizes[0] / sizes[1] - 1.0)
     if not abs(error) <= LARGEST_SCALE_ERROR:
@@ -152,7 +155,7 @@ def _check_scale(points: Array, places: Array) -> float:
 
 
 def _rotation(points: Array, places: Array) -> Array:
-    """Best proper rotation of centred ``points`` to ``places`` [K76]."""
+    """Return the best proper rotation of centred ``points`` to ``places`` [K76]."""
     u, _, vt = np.linalg.svd((points - points.mean(axis=0)).T @ (places - places.mean(axis=0)))
     handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
     rotation: Array = vt.T @ handed @ u.T
@@ -160,7 +163,7 @@ def _rotation(points: Array, places: Array) -> Array:
 
 
 def _heading(points: Array, places: Array, up: Array) -> Array:
-    """Best rotation that takes ``up`` to z."""
+    """Return the best rotation that takes ``up`` to z."""
     side = np.roll(up, 1)
     upright = np.array([side, np.cross(up, side), up])
     flat = (points - points.mean(axis=0)) @ upright.T

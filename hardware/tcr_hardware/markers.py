@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment  # type: ignore[attr-defined]
 
 from tcr_hardware.errors import HardwareError
-from tcr_hardware.natnet.frame import MODEL_FILLED, OCCLUDED, UNLABELLED, Frame
+from tcr_hardware.natnet.frame import MODEL_FILLED, OCCLUDED, UNLABELLED, MocapFrame
 from tcr_hardware.natnet.marker_frame import MarkerFrame
 from tcr_hardware.natnet.models import ModelDefinitions
 from tcr_hardware.rigid_transform import IDENTITY, Array, RigidTransform
@@ -199,8 +199,8 @@ class MarkerMap:
         self._models = models
         return known
 
-    def _by_number(self, data: Frame, reasons: NDArray[np.object_]) -> Array:
-        """Positions (n, 3) of labelled nodes in the rig frame; fills in why they cannot be used."""
+    def _by_number(self, data: MocapFrame, reasons: NDArray[np.object_]) -> Array:
+        """Return the positions (n, 3) of labelled nodes in the rig frame; fills in why they cannot be used."""
         found = np.full((len(self.nodes), 3), np.nan)
         rows = {number: row for row, number in enumerate(data.markers["id"].tolist())}
         at = np.array([rows.get(number, -1) for number in self._ids.tolist()])
@@ -217,7 +217,7 @@ class MarkerMap:
         found[listed] = self.transform.apply(marker["position"])
         return found
 
-    def _nearest(self, data: Frame, reference: Array, width: Array) -> Array:
+    def _nearest(self, data: MocapFrame, reference: Array, width: Array) -> Array:
         """Match unlabelled points to nodes so that the sum of gated distances is least; NaN where none fits."""
         found = np.full_like(reference, np.nan)
         points = self.transform.apply(_points_without_name(data))
@@ -238,8 +238,8 @@ def _check_shared(nodes: Sequence[NodeMarker]) -> None:
             raise SharedMarkerError(owners[identity], node)
 
 
-def _points_without_name(data: Frame) -> NDArray[np.float32]:
-    """Unlabelled points (k, 3): from their own list, or (newer servers) flagged among the labelled markers."""
+def _points_without_name(data: MocapFrame) -> NDArray[np.float32]:
+    """Return unlabelled points (k, 3): from their own list, or (newer servers) flagged among labelled markers."""
     points = data.unlabelled
     if not len(points):
         points = data.markers["position"][data.markers["params"] & UNLABELLED != 0]

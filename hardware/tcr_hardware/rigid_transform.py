@@ -33,7 +33,8 @@ class RigidTransform:
         Raises:
             ValueError: Wrong shape, not finite, a reflection or not orthogonal, or a scale that is not positive.
         """
-        rotation, translation = np.array(self.rotation, float), np.array(self.translation, float)
+        rotation = np.array(self.rotation, float)
+        translation = np.array(self.translation, float)
         if rotation.shape != (3, 3) or translation.shape != (3,):
             raise ValueError(f"shapes {rotation.shape} and {translation.shape}, expected (3, 3) and (3,)")
         if not (np.isfinite(translation).all() and 0.0 < self.scale_m < float("inf")):
@@ -53,7 +54,7 @@ class RigidTransform:
         return ((np.asarray(points, float) - self.translation) @ self.rotation) / self.scale_m
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for a file: quaternion x, y, z, w, translation [m], scale [m]."""
+        """Return plain numbers for a file: quaternion x, y, z, w, translation [m], scale [m]."""
         quaternion: list[float] = Rotation.from_matrix(self.rotation).as_quat(canonical=True).tolist()
         return {
             "quaternion_xyzw": quaternion,

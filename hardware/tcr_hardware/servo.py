@@ -3,7 +3,7 @@
     set-point -> dead time -> counts -> position loop with lag and limits -> encoder -> play -> winch -> cable
 
 The emulated PLC and the simulated plant move their cables by it. Nothing in it knows where it is used.
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Servo:
         """Cable taken in [um]."""
         return self._settings.zero_error_um + (1.0 + self._settings.radius_error) * self.shaft
 
-    def step(self, setpoint: float, dt: float) -> None:
+    def advance(self, setpoint: float, dt: float) -> None:
         """Follow a set-point [um] for ``dt`` [s].
 
         The wanted speed is error / lag, never more than what the drive can still brake from before the set-point,
@@ -113,7 +113,7 @@ def in_counts(position: float, count: float) -> float:
 
 
 def braking_speed(distance: float, limits: ServoSettings, dt: float) -> float:
-    """Largest speed from which a drive stops within a distance, when its speed changes once per ``dt`` only.
+    """Return largest speed from which a drive stops within a distance, when its speed changes once per ``dt`` only.
 
     Braking from (n + f) steps of speed, 0 <= f < 1, takes (n + 1) (n / 2 + f) steps of distance.
     """

@@ -34,7 +34,7 @@ class Entry:
     b: Any
 
     def as_json(self) -> dict[str, Any]:
-        """An item of ``settings`` or ``provenance`` in ``diff --json``."""
+        """Return an item of ``settings`` or ``provenance`` in ``diff --json``."""
         return {"key": self.key, "a": self.a, "b": self.b}
 
 
@@ -62,7 +62,7 @@ class LogDiff:
         return not (self.settings or self.first or self.steps[0] or self.steps[1])
 
     def as_json(self) -> dict[str, Any]:
-        """The object of ``diff --json``."""
+        """Return the object of ``diff --json``."""
         only_a, only_b, both = self.steps
         first = None if self.first is None else self.first.as_json()
         if first is not None:
@@ -128,7 +128,7 @@ def _unequal(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Entry, ...]:
 
 
 def _settings(log: Log) -> dict[str, Any]:
-    """Settings by dotted key: those of the experiment as it ran, and those of the robot after its file's name."""
+    """Return settings by dotted key: those of the experiment as run, those of the robot after its file's name."""
     files = RunFiles(log)
     experiment, robot = _content(files, RESOLVED), _content(files, ROBOT)
     return {**dict(_flat(experiment)), **{f"{ROBOT}: {key}": value for key, value in _flat(robot)}}
@@ -142,7 +142,7 @@ def _content(files: RunFiles, name: str) -> Any:
 
 
 def _flat(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Leaves of nested maps by dotted key; a list is a leaf."""
+    """Return the leaves of nested maps by dotted key; a list is a leaf."""
     if not isinstance(value, dict):
         if prefix:
             yield prefix, value

@@ -116,7 +116,7 @@ def export_npz(
 
 
 def _table(log: Log, nodes: bool) -> dict[str, NDArray[Any]]:
-    """Every number of every step, each (n_steps,), by full name."""
+    """Return every number of every step, each (n_steps,), by full name."""
     wanted = [name for name, column in COLUMNS.items() if nodes or not _per_node(column)]
     table: dict[str, NDArray[Any]] = {}
     for name, values in log.columns(wanted).items():
@@ -125,7 +125,7 @@ def _table(log: Log, nodes: bool) -> dict[str, NDArray[Any]]:
 
 
 def _per_node(column: Column) -> bool:
-    """Whether a quantity has so many numbers that a table is better off without."""
+    """Tell whether a quantity has so many numbers that a table is better off without."""
     raw = column.path.startswith("measurement.raw.") and column.kind.endswith("[]")
     return raw or column.field in PER_NODE
 
@@ -151,7 +151,7 @@ def _flat(name: str, values: NDArray[Any], log: Log) -> dict[str, NDArray[Any]]:
 
 
 def _labels(column: Column, shape: tuple[int, ...], log: Log) -> list[str]:
-    """Name of every component, in memory order; numbers where the log knows no names."""
+    """Return the name of every component, in memory order; numbers where the log knows no names."""
     count = int(np.prod(shape))
     if column.field in PER_CABLE:
         labels = list(log.cable_names)

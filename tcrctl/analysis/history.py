@@ -24,9 +24,17 @@ from tcrctl.robot.module import SIZE
 from tcrctl.signals import Array
 
 _COLUMNS: Final = (
-    "t", "period", "reference_position", "reference_normal", "measurement_drive", "applied_speed",
-    "info_saturated", "timing_estimate", "timing_control", "timing_lateness",
-)  # fmt: skip
+    "t",
+    "period",
+    "reference_position",
+    "reference_normal",
+    "measurement_drive",
+    "applied_speed",
+    "info_saturated",
+    "timing_estimate",
+    "timing_control",
+    "timing_lateness",
+)
 #: What a simulated plant knows exactly and an estimator finds; the truth is shown where there is one.
 _STATE: Final = ("position", "normal", "tension", "q")
 
@@ -176,7 +184,7 @@ def read_histories(
 
 
 def _labels(logs: Sequence[Log]) -> list[str]:
-    """Shortest names that tell the runs apart: experiment, or with what was set, or with the run's id."""
+    """Return shortest names that tell the runs apart: experiment, or with what was set, or with the run's id."""
     spec = [log.start.get("spec") or log.path.stem for log in logs]
     overrides = [" ".join(_overrides(log)) for log in logs]
     found = []
@@ -234,7 +242,7 @@ def _history(log: Log, label: str, begin: float | None, end: float | None) -> Hi
 
 
 def _shapes(q: NDArray[Any]) -> tuple[NDArray[np.int64], Array]:
-    """Steps with a whole shape, and the shapes; a log need not have one at every step."""
+    """Return steps with a whole shape, and the shapes; a log need not have one at every step."""
     if not q.shape[1] or q.shape[1] % SIZE:
         return np.zeros(0, np.int64), np.zeros((0, 0, 3))
     known = np.flatnonzero(np.isfinite(q).all(axis=1))

@@ -85,7 +85,7 @@ class LogInfo:
         return [item for item in found if isinstance(item, dict)] if isinstance(found, list) else []
 
     def as_json(self) -> dict[str, Any]:
-        """One object for ``info --json``; keys are the attributes, and ``criteria``."""
+        """Return one object for ``info --json``; keys are the attributes, and ``criteria``."""
         return {**asdict(self), "criteria": self.criteria}
 
 
@@ -124,7 +124,9 @@ def inspect(path: str | os.PathLike[str]) -> LogInfo:
 
 
 def _timing(columns: dict[str, NDArray[Any]]) -> dict[str, Any]:
-    k, t, lateness = columns["k"], columns["t"], columns["timing_lateness"]
+    k = columns["k"]
+    t = columns["t"]
+    lateness = columns["timing_lateness"]
     if not len(k):
         empty = {
             "rate_hz": None,
@@ -151,7 +153,8 @@ def _timing(columns: dict[str, NDArray[Any]]) -> dict[str, Any]:
 
 def _overruns(columns: dict[str, NDArray[Any]]) -> int:
     """Count overruns as the run itself does; only a paced run is ever late."""
-    lateness, busy = columns["timing_lateness"], np.sum([columns[name] for name in _BUSY], axis=0)
+    lateness = columns["timing_lateness"]
+    busy = np.sum([columns[name] for name in _BUSY], axis=0)
     return (
         int(np.count_nonzero(np.maximum(lateness, busy) > columns["period"])) if np.any(lateness > 0.0) else 0
     )

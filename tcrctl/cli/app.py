@@ -122,7 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _prepare_process() -> None:
-    """Settings that libraries read when they are loaded.
+    """Set what libraries read when they are loaded.
 
     Threads for the small matrices of a control step would only wait for each other. The kernels gain nothing from
     the compiler's higher levels, and a cold start is a fifth shorter without them.

@@ -146,7 +146,7 @@ def _loaded(inputs: list[str], told: Told, changes: list[str]) -> LoadedIdentifi
 
 
 def _from_data(data: list[str], robot: str, params: str, changes: list[str]) -> LoadedIdentification:
-    """An identification that was told on the command line."""
+    """Build the identification that was told on the command line."""
     from tcrctl.config import strict_yaml
     from tcrctl.config.keys import Keys
     from tcrctl.identify.loading import from_document
@@ -190,7 +190,7 @@ def _say(text: str) -> None:
 
 @contextmanager
 def _progress_line(*, shown: bool) -> Iterator[Callable[[str, int, float], None]]:
-    """What is being done, evaluations per second and the best error, on stderr if that is a terminal."""
+    """Show what is being done, evaluations per second and the best error, on stderr if that is a terminal."""
     if not (shown and sys.stderr.isatty()):
         yield lambda what, evaluations, best_mm: None
         return

@@ -84,7 +84,8 @@ def unfolded(verb: Callable[..., None]) -> Callable[..., None]:
 
 def _fields(group: Any) -> list[inspect.Parameter]:
     """Return the fields of a dataclass as parameters; one without a default is required."""
-    hints, kind = get_type_hints(group, include_extras=True), inspect.Parameter.POSITIONAL_OR_KEYWORD
+    hints = get_type_hints(group, include_extras=True)
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
     required = inspect.Parameter.empty
     return [
         inspect.Parameter(

@@ -40,7 +40,7 @@ def rows(summary: Summary) -> Iterator[Row]:
 
 
 def _task(task: Mapping[str, Any]) -> Iterator[str]:
-    """One line per thing that the task lists, then its other values in one."""
+    """Return one line per thing that the task lists, then its other values in one."""
     for items in task.values():
         for item in items if isinstance(items, list) else ():
             rest = {key: value for key, value in item.items() if key != "name"}
@@ -55,7 +55,7 @@ def _values(values: Mapping[str, Any]) -> str:
 
 
 def _value(key: str, value: Any) -> str:
-    """``beam passes yes``, ``dwell 5.25 s``: a key that ends in its unit gives it to the number."""
+    """Return ``beam passes yes``, ``dwell 5.25 s``: a key that ends in its unit gives it to the number."""
     if isinstance(value, bool):
         return f"{key.replace('_', ' ')} {'yes' if value else 'no'}"
     if isinstance(value, float):

@@ -253,7 +253,7 @@ def _print_tables(found: Findings) -> None:
 
 @contextmanager
 def _progress(name: str, total: int, *, quiet: bool) -> Iterator[Told]:
-    """A bar on a terminal; elsewhere a line for every run."""
+    """Show a bar on a terminal; elsewhere a line for every run."""
     from tcrctl.cli.progress import progress_bar
 
     count = 0

@@ -20,9 +20,9 @@ class Reach:
     """How far is looked."""
 
     rays: Annotated[int, typer.Option("--rays", metavar="N", min=1, max=1_000_000, help="Directions.")] = 512
-    step: Annotated[
+    spacing: Annotated[
         float,
-        typer.Option("--step-mm", min=0.1, max=50.0, help="Change of the fastest drive between points."),
+        typer.Option("--spacing-mm", min=0.1, max=50.0, help="Change of the fastest drive between points."),
     ] = 4.0
     floor: Annotated[float, typer.Option("--floor-n", min=0.0, help="Lowest tension of a taut cable.")] = 0.5
     ceiling: Annotated[
@@ -64,7 +64,7 @@ def workspace(
         check_writable(out)
         description = load_robot(robot)
         ceiling = description.tension_limit_n if reach.ceiling is None else reach.ceiling
-        limits = Limits(reach.floor, ceiling, 1e-3 * reach.step)
+        limits = Limits(reach.floor, ceiling, 1e-3 * reach.spacing)
     with progress_bar(description.name, shown=not quiet) as progress:
         found = explore(description, reach.rays, limits, side.engine, progress)
     folder = make_run_folder(out, f"{description.name}_workspace").path

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tcr_hardware.calibration import Calibration, average, calibrate
+from tcr_hardware.calibration import CalibrationResult, average, calibrate
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.markers import Gate, MarkerMap, NodeMarker
 from tcr_hardware.natnet.client import NatNetClient
@@ -24,7 +24,7 @@ from tcrctl.signals import Array
 BASE = ("base.n1", "base.n2", "base.n3")
 
 
-def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool) -> Calibration:
+def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool) -> CalibrationResult:
     """Measure the base ring and find the transform.
 
     Args:
@@ -58,9 +58,11 @@ def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool
 
 
 def _measured(client: NatNetClient, nodes: list[NodeMarker], seconds: float) -> Array:
-    """Mean marker positions in the cameras' frame (n, 3)."""
+    """Return the mean marker positions in the cameras' frame (n, 3)."""
     found = MarkerMap(nodes, np.zeros((len(nodes), 3)), gate=Gate(np.inf, np.inf, np.inf))
-    positions, valid, frame = [], [], None
+    positions = []
+    valid = []
+    frame = None
     end = time.monotonic() + seconds
     with device_errors("cameras"):
         found.resolve(client.wait_models())
@@ -80,8 +82,8 @@ def _measured(client: NatNetClient, nodes: list[NodeMarker], seconds: float) -> 
     return mean.mean
 
 
-def calibration_text(found: Calibration) -> str:
-    """The section ``calibration`` of a rig file, in one line."""
+def calibration_text(found: CalibrationResult) -> str:
+    """Write the section ``calibration`` of a rig file, in one line."""
     numbers: dict[str, Any] = found.transform.as_dict()
     rounded = {
         "quaternion_xyzw": [round(x, 9) for x in numbers["quaternion_xyzw"]],

@@ -10,7 +10,7 @@ import numpy as np
 
 from tcrctl.commissioning.finding import Finding
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.plant.rig.bench import connect_cameras, connect_drives
+from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
 from tcrctl.plant.rig.devices import DriveStatus, Sighting
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.modbus_drives import ModbusDrives
@@ -91,7 +91,7 @@ def _check_cameras(cameras: NatNetCameras, robot: Robot) -> Iterator[Finding]:
 
 
 def _check_places(sighting: Sighting, robot: Robot) -> Iterator[Finding]:
-    """Sizes tell the unit and the labels, places tell the calibration."""
+    """Check sizes, which tell the unit and the labels, and places, which tell the calibration."""
     rest = robot.rest.q.reshape(-1, 3)[ring_rows(robot.n_modules)].reshape(-1, 3, 3)
     rings = sighting.nodes.astype(float).reshape(-1, 3, 3)
     whole = sighting.valid.reshape(-1, 3).all(axis=1)

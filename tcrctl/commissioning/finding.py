@@ -22,10 +22,10 @@ class Finding:
     exit_code: int = 0
 
     def as_json(self) -> dict[str, Any]:
-        """The finding as an object."""
+        """Return the finding as an object."""
         return {**asdict(self), "ok": self.exit_code == 0}
 
 
 def worst(findings: Sequence[Finding]) -> int:
-    """Exit code of the first finding that is not as it should be; 0 if all are."""
+    """Return the exit code of the first finding that is not as it should be; 0 if all are."""
     return next((finding.exit_code for finding in findings if finding.exit_code), 0)

@@ -13,10 +13,10 @@ from tcrctl.commissioning.without_cameras import WithoutCameras
 from tcrctl.errors import InputError
 from tcrctl.loop.loop import step_count
 from tcrctl.loop.pacing import RealTime
-from tcrctl.plant.rig.bench import connect_drives, envelope, supervisor_rules
+from tcrctl.plant.rig.assembly import connect_drives, envelope, supervisor_rules
 from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
-from tcrctl.plant.rig.session import Session
 from tcrctl.signals import Array, Command
 
 #: Period of the writes [s].
@@ -40,7 +40,7 @@ class Jog:
     speed: float
 
     def distances(self, names: tuple[str, ...], now: Array) -> Array:
-        """How far every cable has to move (m,) [m] from where it is ``now`` (m,) [m]."""
+        """Return how far every cable has to move (m,) [m] from where it is ``now`` (m,) [m]."""
         moving = np.array([name in self.cables for name in names])
         wanted = np.full(len(names), self.by) if self.to is None else self.to - now
         return np.where(moving, wanted, 0.0)
@@ -50,7 +50,7 @@ def jog_rig(
     loaded: LoadedRig,
     names: tuple[str, ...],
     jog: Jog,
-    session: Session,
+    operation: Operation,
     *,
     dry_run: bool,
     check: Callable[[], None],
@@ -61,7 +61,7 @@ def jog_rig(
         loaded: The rig file.
         names: Cables of the robot in the order of the drives.
         jog: The motion.
-        session: Takes events, knows whether the operator has agreed.
+        operation: Takes events, knows whether the operator has agreed.
         dry_run: Read where the drives are and return what would be done; nothing is written.
         check: Raises if a signal asks to stop.
 
@@ -76,7 +76,7 @@ def jog_rig(
         envelope(loaded.mounted, rules, names), supervisor_rules(rules), 1.0, 0, 0, rules.arm_timeout_s
     )
     pace = RealTime(PERIOD, check)
-    plant = RigPlant(WithoutCameras(), drives, limits, PERIOD, session)
+    plant = RigPlant(WithoutCameras(), drives, limits, PERIOD, operation)
     try:
         drives.check(rules, PERIOD)
         plant.look()
@@ -101,7 +101,7 @@ def jog_rig(
 
 
 def _rate(k: int, duration: float) -> float:
-    """Share of the distance per second in step k: (1 - cos) / T, exact in sum over a whole number of steps."""
+    """Return the distance's share per second in step k: (1 - cos) / T, exact in sum over all steps."""
     steps = step_count(duration, PERIOD)
     if k >= steps:
         return 0.0
@@ -109,7 +109,7 @@ def _rate(k: int, duration: float) -> float:
 
 
 def _check(jog: Jog, limits: RigLimits, names: tuple[str, ...], target: Array, distance: Array) -> float:
-    """Duration [s] of a motion whose highest speed, twice the mean, is the one asked for."""
+    """Return the duration [s] of a motion whose highest speed, twice the mean, is the one asked for."""
     unknown = [name for name in jog.cables if name not in names]
     if unknown:
         raise InputError(f"there is no cable {unknown[0]}; there are {', '.join(names)}")

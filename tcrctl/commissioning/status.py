@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.plant.rig.bench import connect_drives
+from tcrctl.plant.rig.assembly import connect_drives
 from tcrctl.plant.rig.devices import DriveStatus
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.natnet_cameras import connect
@@ -35,7 +35,7 @@ class RigStatus:
     exit_code: int
 
     def as_json(self) -> dict[str, Any]:
-        """The status as an object."""
+        """Return the status as an object."""
         bits: dict[str, Any] = {}
         if self.drives is not None:
             names = (

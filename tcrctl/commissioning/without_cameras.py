@@ -16,10 +16,10 @@ class WithoutCameras:
     rate = 1000.0
 
     def next(self, timeout: float, *, fresh: bool) -> Sighting | None:
-        """A frame without markers, taken now."""
+        """Return a frame without markers, taken now."""
         del timeout, fresh
         none = RawFrame(0, 0, 0.0, np.zeros(0, np.int32), np.zeros((0, 3), np.float32), np.zeros(0, np.int32))
         return Sighting(time.monotonic(), np.zeros((0, 3), np.float32), np.zeros(0, np.bool_), "", none)
 
     def close(self) -> None:
-        """Nothing to close."""
+        """Do nothing: there is nothing to close."""

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from tcrctl.errors import ArmingRefusedError, DeviceError
-from tcrctl.plant.rig.bench import connect_drives, supervisor_rules
+from tcrctl.plant.rig.assembly import connect_drives, supervisor_rules
 from tcrctl.plant.rig.devices import DriveControl, Drives, DriveStatus
 from tcrctl.plant.rig.file import LoadedRig
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.supervisor import Supervisor
 
 #: How long the PLC has for what an edge asks for [s].
@@ -21,7 +21,9 @@ AT_ZERO: Final = 50
 STILL: Final = 20
 
 
-def zero_rig(loaded: LoadedRig, names: tuple[str, ...], session: Session, *, dry_run: bool) -> dict[str, Any]:
+def zero_rig(
+    loaded: LoadedRig, names: tuple[str, ...], operation: Operation, *, dry_run: bool
+) -> dict[str, Any]:
     """Make the present positions of all drives zero.
 
     The operator has brought every cable to its rest tension before, with the PLC's own manual mode.
@@ -29,7 +31,7 @@ def zero_rig(loaded: LoadedRig, names: tuple[str, ...], session: Session, *, dry
     Args:
         loaded: The rig file.
         names: Cables in the order of the drives.
-        session: Takes events, knows whether the operator has agreed.
+        operation: Takes events, knows whether the operator has agreed.
         dry_run: Only look whether it could be done.
 
     Returns:
@@ -40,9 +42,9 @@ def zero_rig(loaded: LoadedRig, names: tuple[str, ...], session: Session, *, dry
         DeviceError: If the PLC does not answer, or does not do it.
     """
     drives = connect_drives(loaded, names)
-    supervisor = Supervisor(supervisor_rules(loaded.rig.safety), session.report)
+    supervisor = Supervisor(supervisor_rules(loaded.rig.safety), operation.report)
     try:
-        before = _standing_still(drives, session, dry_run=dry_run)
+        before = _standing_still(drives, operation, dry_run=dry_run)
         result = {"before_mm": _positions(names, before), "zeroed": before.zeroed}
         if dry_run:
             return result
@@ -60,14 +62,14 @@ def zero_rig(loaded: LoadedRig, names: tuple[str, ...], session: Session, *, dry
 
 
 def reset_rig(
-    loaded: LoadedRig, names: tuple[str, ...], session: Session, *, dry_run: bool
+    loaded: LoadedRig, names: tuple[str, ...], operation: Operation, *, dry_run: bool
 ) -> dict[str, Any]:
     """Clear the latched fault of a PLC whose cause has been removed; nothing moves.
 
     Args:
         loaded: The rig file.
         names: Cables in the order of the drives.
-        session: Takes events, knows whether the operator has agreed.
+        operation: Takes events, knows whether the operator has agreed.
         dry_run: Only say what is latched.
 
     Raises:
@@ -81,19 +83,19 @@ def reset_rig(
         if dry_run or not fault:
             return {"fault": fault or None, "cleared": False}
         reasons = ["the emergency stop is pressed"] if before.estop else []
-        reasons += [] if session.confirmed else ["the operator has not agreed (--yes)"]
+        reasons += [] if operation.confirmed else ["the operator has not agreed (--yes)"]
         if reasons:
             raise ArmingRefusedError(reasons)
         after = _edge(drives, before, DriveControl(reset=True), lambda s: not (s.fault or s.watchdog))
         if after is None:
             raise DeviceError(f"the PLC keeps its fault: {fault}", hint="Its cause may still be there.")
-        session.report("rig", "info", f"fault cleared: {fault}")
+        operation.report("rig", "info", f"fault cleared: {fault}")
         return {"fault": fault, "cleared": True}
     finally:
         drives.close()
 
 
-def _standing_still(drives: Drives, session: Session, *, dry_run: bool) -> DriveStatus:
+def _standing_still(drives: Drives, operation: Operation, *, dry_run: bool) -> DriveStatus:
     first = drives.status()
     time.sleep(5 * CYCLE)
     status = drives.status()
@@ -101,7 +103,7 @@ def _standing_still(drives: Drives, session: Session, *, dry_run: bool) -> Drive
     reasons += [f"the PLC reports a fault: {status.fault}"] if status.fault else []
     reasons += ["a drive is moving"] if abs(status.position - first.position).max() > STILL else []
     reasons += ["the drives are enabled by somebody else"] if status.enabled else []
-    reasons += [] if session.confirmed or dry_run else ["the operator has not agreed (--yes)"]
+    reasons += [] if operation.confirmed or dry_run else ["the operator has not agreed (--yes)"]
     if reasons:
         raise ArmingRefusedError(reasons)
     return status

@@ -27,7 +27,7 @@ class Settings(BaseModel):
     moved: ClassVar[Mapping[str, str]] = {}
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
-        """Itself: settings never change."""
+        """Return itself: settings never change."""
         del memo
         return self
 

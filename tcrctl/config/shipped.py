@@ -131,12 +131,12 @@ def find_rig(name_or_path: str, folder: Path | None = None) -> Path:
 
 
 def is_identification(name_or_path: str) -> bool:
-    """Whether a shipped name or a file is an identification; False if there is none or it cannot be read."""
+    """Tell whether a shipped name or a file is an identification; False if there is none or it cannot be read."""
     return _is_kind("identification", name_or_path, identifications())
 
 
 def is_study(name_or_path: str) -> bool:
-    """Whether a shipped name or a file is a study; an experiment of the same name comes first."""
+    """Tell whether a shipped name or a file is a study; an experiment of the same name comes first."""
     if name_or_path in experiments():
         return False
     return _is_kind("study", name_or_path, studies())

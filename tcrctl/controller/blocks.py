@@ -54,7 +54,9 @@ def superpose(change: Array, now: Array, edges: Array) -> tuple[Array, Array]:
     Returns:
         free (n, rows) and gain (n, rows, blocks * m).
     """
-    n, rows, m = change.shape[0], change.shape[1], change.shape[2] - 1
+    n = change.shape[0]
+    rows = change.shape[1]
+    m = change.shape[2] - 1
     free, gain = np.empty((n, rows)), np.zeros((n, rows, (edges.shape[0] - 1) * m))
     for i in range(n):
         for r in range(rows):

@@ -1,4 +1,4 @@
-"""From settings to the arrays of the quadratic problem: weights, targets and input limits."""
+"""From settings to the arrays of the quadratic program: weights, targets and input limits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tcrctl.signals import Array, Estimate, Reference
 
 
 def make_weights(settings: IocSettings, m: int, instants: int) -> Weights:
-    """Weights of (30) for ``m`` cables; position-only tracking has no weight on normal and twist.
+    """Return the weights of (30) for ``m`` cables; position-only tracking has no weight on normal and twist.
 
     The output weights are shared out over the prediction ``instants``, so that the cost is their mean and R and W
     mean the same whatever their number. W is what keeps the loop stable when the plant's slow modes are faster
@@ -38,7 +38,7 @@ def make_weights(settings: IocSettings, m: int, instants: int) -> Weights:
 
 
 def make_target(settings: IocSettings, reference: Reference, shift: Array, m: int) -> Array:
-    """Outputs wanted at the prediction instants (n, 7 + m), shifted by the integral action (6,)."""
+    """Return outputs wanted at the prediction instants (n, 7 + m), shifted by the integral action (6,)."""
     n = reference.ahead_position.shape[0]
     target = np.zeros((n, POSE_ROWS + m))
     target[:, :3] = reference.ahead_position + shift[:3]
@@ -52,9 +52,10 @@ def make_target(settings: IocSettings, reference: Reference, shift: Array, m: in
 def input_limits(
     settings: IocSettings | KinematicSettings, robot: Robot, drive: Array, blocks: int
 ) -> tuple[Array, Array]:
-    """Hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
+    """Return hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
     limit = speed_limit(settings)
-    low, high = np.full(blocks * drive.shape[0], -limit), np.full(blocks * drive.shape[0], limit)
+    low = np.full(blocks * drive.shape[0], -limit)
+    high = np.full(blocks * drive.shape[0], limit)
     m = drive.shape[0]
     # a drive outside its stroke may still move back: limits never cross
     low[:m] = np.minimum(np.maximum((robot.stroke[0] - drive) / settings.period_s, -limit), limit)
@@ -63,13 +64,13 @@ def input_limits(
 
 
 def pose_error(reference: Reference, position: Array, normal: Array) -> Array:
-    """Wanted minus measured end pose (6,): position [m], normal (0 where it is not tracked)."""
+    """Return the wanted minus measured end pose (6,): position [m], normal (0 where it is not tracked)."""
     turned = np.zeros(3) if reference.normal is None else reference.normal - normal
     return np.concatenate([reference.position - position, turned])
 
 
 def outputs(estimate: Estimate, age: float, robot: Robot) -> Array:
-    """Outputs now (7 + m,): end position, normal, twist, tensions, moved on by ``age`` [s] with the velocity."""
+    """Return outputs now (7 + m,): end position, normal, twist, tensions, moved on by ``age`` [s] with v."""
     first = 3 * robot.tip
     moved = age * (pose.output_matrix(estimate.q, robot.tip) @ estimate.v[first : first + 9])
     twist = pose.twist(estimate.q, robot.tip)

@@ -10,7 +10,7 @@ mean only 2/π asin(U / V) of its friction, with mean speed U and dither speed V
 The measure is the innovation: the measured end position against the one predicted a period before, averaged over a
 whole wave so that the dither's own trace is not in it. A robot without friction does what is predicted, whatever
 else is wrong with its model, so its drives are left in peace. [ADC94]
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 
@@ -62,7 +62,9 @@ class Dither:
 
     def __init__(self, settings: DitherSettings | None, period: float, robot: Robot) -> None:
         """Take a ``dither:`` section, or None for none, the control period [s] and the robot."""
-        self._settings, self._period, self.runs = settings or DitherSettings(), period, settings is not None
+        self._settings = settings or DitherSettings()
+        self._period = period
+        self.runs = settings is not None
         self._half_wave = max(1, round(0.5 / (self._settings.frequency_hz * period)))  # periods
         self._step = (
             self._half_wave // 2

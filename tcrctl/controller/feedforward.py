@@ -25,7 +25,7 @@ SLACK = 1e-6
 
 @njit(cache=True, error_model="numpy")
 def needed_speeds(gain: Array, output: Array, poses: Array, edges: Array, spacing: float) -> Array:
-    """Speeds w (blocks, m) [m/s] with which the end, always at rest, follows the reference.
+    """Return the speeds w (blocks, m) [m/s] with which the end, always at rest, follows the reference.
 
     Args:
         gain: S, position and normal by the drives at rest (6, m).
@@ -53,7 +53,7 @@ def needed_speeds(gain: Array, output: Array, poses: Array, edges: Array, spacin
 
 @njit(cache=True, error_model="numpy")
 def wanted_changes(previous: Array, needed_before: Array, needed: Array) -> Array:
-    """Changes of speed that cost nothing, block after block (blocks * m,) [m/s]; the first one from standstill.
+    """Return changes of speed that cost nothing, block by block (blocks * m,) [m/s]; the first from standstill.
 
     Args:
         previous: Input of the last step (m,) [m/s].
@@ -70,7 +70,7 @@ def wanted_changes(previous: Array, needed_before: Array, needed: Array) -> Arra
 
 
 def reference_poses(reference: Reference) -> Array:
-    """Position and normal now and at the instants (n + 1, 6); a normal that is not wanted stands still."""
+    """Return position and normal now and at the instants (n + 1, 6); a normal that is not wanted stands still."""
     poses = np.zeros((reference.ahead_position.shape[0] + 1, 6))
     poses[0, :3], poses[1:, :3] = reference.position, reference.ahead_position
     if reference.normal is not None and reference.ahead_normal is not None:

@@ -57,16 +57,18 @@ def newton_map(what: str, robot: Robot, load: Load, drive: Array, q: Array) -> I
         q: Solution (3 n_nodes,) [m].
     """
     first, ws = 3 * FIXED, make_workspace(robot.model)
-    nodal, bars, cables = load.nodal.copy(), load.bar_before.copy(), load.cable_before.copy()
+    nodal = load.nodal.copy()
+    bars = load.bar_before.copy()
+    cables = load.cable_before.copy()
     at = Load(load.inertia, load.w, nodal, bars, cables, None)
 
     def apply(z: Array) -> Array:
-        moved, step = q.copy(), np.empty(z.shape)
+        moved, change = q.copy(), np.empty(z.shape)
         moved[first:] = z
         assemble(robot.model, moved, drive, at, ws, True)
         linear.factor_shifted(ws.K, ws.U)
-        linear.solve(ws, ws.r, step)
-        return z - step
+        linear.solve(ws, ws.r, change)
+        return z - change
 
     q = q.copy()
     return InnerMap(what, q[first:].copy(), np.full(q.size - first, 1e-3), apply)

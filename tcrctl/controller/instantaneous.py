@@ -78,8 +78,8 @@ class InstantaneousOptimalControl:
         if not reason:
             target = make_target(self._settings, at.reference, at.shift, self._m)
             changes = self._free_changes(forecast, at.reference, at.previous)
-            problem = build_ioc(forecast.prediction, target, changes, at.low, at.high, self._weights)
-            solution = solve_ioc(problem, forecast.prediction, self._weights)
+            program = build_ioc(forecast.prediction, target, changes, at.low, at.high, self._weights)
+            solution = solve_ioc(program, forecast.prediction, self._weights)
             if not (solution.solved and solution.residual <= LCP_TOLERANCE):
                 reason = f"the complementarity problem was not solved (residual {solution.residual:.2g})"
         if reason:  # from standstill the speed that the reference needs is a free change

@@ -26,7 +26,7 @@ class IntegralAction:
         self._limit = np.repeat([mm / 1000.0, math.radians(deg)], 3)
 
     def memory(self, normal: Array | None) -> Mapping[str, Kept]:
-        """The shift of the position, and of the ``normal`` (3,) if that is tracked; nothing while it is off."""
+        """Return the shift of the position, and of the ``normal`` (3,) if that is tracked; 0 while it is off."""
         if self._rate == 0.0:
             return {}
         position = {"integral_position": Kept(self.shift[:3], POSITION)}

@@ -1,4 +1,4 @@
-"""Instantaneous optimal control: the quadratic problem (30)-(32) and its solution as an LCP (33)-(40).
+"""Instantaneous optimal control: the quadratic program (30)-(32) and its solution as an LCP (33)-(40).
 
 The prediction is affine in the inputs U (all blocks of all drives): Y = Y_0 + S U, in the place of (31). Then
 
@@ -61,8 +61,8 @@ class Prediction(NamedTuple):
     gain: Array
 
 
-class Problem(NamedTuple):
-    """The quadratic problem: 1/2 U'H U + g'U, low <= U <= high, soft tension rows.
+class QuadraticProgram(NamedTuple):
+    """The quadratic program: 1/2 U'H U + g'U, low <= U <= high, soft tension rows.
 
     Attributes:
         H: Hessian (U, U).
@@ -98,7 +98,7 @@ class Solution(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def build_ioc(
     prediction: Prediction, target: Array, changes: Array, low: Array, high: Array, weights: Weights
-) -> Problem:
+) -> QuadraticProgram:
     """Assemble (32) for an affine prediction.
 
     Args:
@@ -111,7 +111,10 @@ def build_ioc(
         weights: Weights of the cost.
     """
     gain = prediction.gain
-    n, rows, size, m = gain.shape[0], gain.shape[1], gain.shape[2], prediction.free.shape[1] - POSE_ROWS
+    n = gain.shape[0]
+    rows = gain.shape[1]
+    size = gain.shape[2]
+    m = prediction.free.shape[1] - POSE_ROWS
     H, g = np.zeros((size, size)), np.zeros(size)
     for i in range(n):
         for r in range(rows):
@@ -134,7 +137,7 @@ def build_ioc(
     for a in range(size):
         for b in range(a):
             H[a, b] = H[b, a]
-    return Problem(H, g, low, high)
+    return QuadraticProgram(H, g, low, high)
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,15 +158,15 @@ def _violated(prediction: Prediction, weights: Weights, U: Array, chosen: Array)
 
 @njit(cache=True, error_model="numpy")
 def _rows(
-    problem: Problem, prediction: Prediction, weights: Weights, chosen: Array
+    program: QuadraticProgram, prediction: Prediction, weights: Weights, chosen: Array
 ) -> tuple[Array, Array, Array]:
-    """A (rows, U), b (rows,), D (rows,): box rows first, then the chosen tension rows."""
-    size, m = problem.g.shape[0], chosen.shape[1] // 2
+    """Return A (rows, U), b (rows,), D (rows,): box rows first, then the chosen tension rows."""
+    size, m = program.g.shape[0], chosen.shape[1] // 2
     total = 2 * size + np.sum(chosen)
     A, b, D = np.zeros((total, size)), np.zeros(total), np.zeros(total)
     for a in range(size):
-        A[a, a], b[a] = -1.0, -problem.high[a]
-        A[size + a, a], b[size + a] = 1.0, problem.low[a]
+        A[a, a], b[a] = -1.0, -program.high[a]
+        A[size + a, a], b[size + a] = 1.0, program.low[a]
     k = 2 * size
     for i in range(chosen.shape[0]):
         for c in range(2 * m):
@@ -179,23 +182,25 @@ def _rows(
 
 
 @njit(cache=True, error_model="numpy")
-def solve_ioc(problem: Problem, prediction: Prediction, weights: Weights) -> Solution:
-    """Solve the problem by Lemke's algorithm, adding tension rows until none outside the LCP is violated.
+def solve_ioc(program: QuadraticProgram, prediction: Prediction, weights: Weights) -> Solution:
+    """Solve the program by Lemke's algorithm, adding tension rows until none outside the LCP is violated.
 
     Args:
-        problem: From :func:`build_ioc`.
+        program: From :func:`build_ioc`.
         prediction: The prediction it was built of.
         weights: Limits of the tension rows.
     """
     m = prediction.free.shape[1] - POSE_ROWS
     chosen = np.zeros((prediction.free.shape[0], 2 * m), dtype=np.bool_)
-    inverse = np.linalg.inv(problem.H)
-    U = np.zeros(problem.g.shape[0])
-    pivots, residual, rows = 0, np.inf, 0
+    inverse = np.linalg.inv(program.H)
+    U = np.zeros(program.g.shape[0])
+    pivots = 0
+    residual = np.inf
+    rows = 0
     for _ in range(MAX_ROUNDS):
-        A, b, D = _rows(problem, prediction, weights, chosen)
+        A, b, D = _rows(program, prediction, weights, chosen)
         rows = b.shape[0]
-        q = -np.dot(A, np.dot(inverse, problem.g)) - b
+        q = -np.dot(A, np.dot(inverse, program.g)) - b
         kappa, residual = np.zeros(rows), 0.0
         if not np.min(q) >= 0.0:  # otherwise κ = 0 solves the LCP and no input stands at a limit
             M = np.dot(np.dot(A, inverse), A.T)
@@ -207,7 +212,7 @@ def solve_ioc(problem: Problem, prediction: Prediction, weights: Weights) -> Sol
             residual = max(w_low, z_low, product)
             if status != SOLVED:
                 return Solution(U, residual, pivots, False, rows)
-        U = np.dot(inverse, np.dot(kappa, A) - problem.g)
+        U = np.dot(inverse, np.dot(kappa, A) - program.g)
         if _violated(prediction, weights, U, chosen) == 0:
             return Solution(U, residual, pivots, True, rows)
     return Solution(U, residual, pivots, False, rows)

@@ -75,7 +75,8 @@ class Kinematic:
         self._settings, self._robot = settings, robot
         rows = 6 if settings.output == "pose" else 3
         self._scale = np.array([1.0] * 3 + [settings.lever_mm / 1000.0] * 3)[:rows]
-        self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
+        self._work = make_workspace(robot.model)
+        self._load = static_load(robot.model, robot.weight)
         self._at = rest_map(robot)
         self._solved, self._tolerance = False, TOLERANCE
         self.ahead, self.blocks = np.array([settings.period_s]), 1
@@ -95,7 +96,9 @@ class Kinematic:
 
     def plan(self, at: Situation) -> Plan:
         """Find the speeds that move the end as wanted, by the static map at the present drives."""
-        robot, drive, tension = self._robot, at.estimate.drive, at.estimate.tension
+        robot = self._robot
+        drive = at.estimate.drive
+        tension = at.estimate.tension
         self._solved = False
         if at.doubt:
             return Plan(np.zeros_like(drive), tension, 0, np.inf)

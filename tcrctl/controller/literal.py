@@ -62,7 +62,7 @@ class LiteralIoc:
     Attributes:
         ahead: The one prediction instant (1,) [s].
         blocks: One block of inputs.
-        gain: ∂q/∂d where the iteration was linearised last (12 n_modules, m).
+        gain: ∂q/∂d where the iteration was linearised last (n_free, m).
     """
 
     extrapolates = anti_windup = False
@@ -71,14 +71,18 @@ class LiteralIoc:
         """Take a ``controller:`` section and the robot."""
         self._settings, self._robot = settings, robot
         self._weights = make_weights(settings, robot.n_cables, 1)
-        self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
+        self._work = make_workspace(robot.model)
+        self._scratch = dynamics.make_scratch(robot.model)
         self.gain = np.zeros((self._work.r.shape[0], robot.n_cables))
         self._last: tuple[Array, Array, Fixed] | None = None
         self.ahead, self.blocks = np.array([settings.period_s]), 1
 
     def _load(self, at: Situation) -> tuple[Array, Load]:
         """Start positions and load of the step (12)-(14) with zero acceleration at its start; or of statics."""
-        period, s, robot, x = self._settings.period_s, self._scratch, self._robot, at.estimate
+        period = self._settings.period_s
+        s = self._scratch
+        robot = self._robot
+        x = at.estimate
         if self._settings.model == "static":
             return x.q.copy(), static_load(robot.model, robot.weight)
         c = coefficients(RHO, period)
@@ -91,12 +95,14 @@ class LiteralIoc:
         return q0, Load(inertia, 2.0 / period, nodal, bars, cables, None)
 
     def _linearise(self, q: Array, drive: Array, load: Load, speed: Array) -> tuple[Array, Prediction]:
-        """Newton step (12 n_modules,) at the present input, and the outputs as (31)."""
-        period, tip, ws = self._settings.period_s, self._robot.tip, self._work
+        """Return the Newton step (n_free,) at the present input, and the outputs as (31)."""
+        period = self._settings.period_s
+        tip = self._robot.tip
+        ws = self._work
         assemble(self._robot.model, q, drive, load, ws, True)
         linear.factor_shifted(ws.K, ws.U)
-        step = np.zeros(ws.r.shape[0])
-        linear.solve(ws, -ws.r, step)
+        change = np.zeros(ws.r.shape[0])
+        linear.solve(ws, -ws.r, change)
         linear.drive_gain(ws, self.gain)
         first, m = 3 * (tip - FIXED), speed.shape[0]
         C = pose.output_matrix(q, tip)
@@ -104,20 +110,20 @@ class LiteralIoc:
         gain[0, :POSE_ROWS] = period * (C @ self.gain[first : first + 9])
         gain[0, POSE_ROWS:] = period * linear.tension_gain(ws, self.gain)
         now = np.concatenate([pose.position(q, tip), pose.normal(q, tip), [pose.twist(q, tip)], ws.tension])
-        now[:POSE_ROWS] += C @ step[first : first + 9]
-        now[POSE_ROWS:] += ws.axial * (ws.G[:, 3 * FIXED :] @ step)
-        return step, Prediction((now - gain[0] @ speed)[None], gain)
+        now[:POSE_ROWS] += C @ change[first : first + 9]
+        now[POSE_ROWS:] += ws.axial * (ws.G[:, 3 * FIXED :] @ change)
+        return change, Prediction((now - gain[0] @ speed)[None], gain)
 
     def _iterate(self, q: Array, speed: Array, fixed: Fixed) -> tuple[Array, Solution]:
-        """(28) with (36): change of the free coordinates (12 n_modules,), and the new input with proof."""
+        """Return (28) with (36): change of the free coordinates (n_free,), and the new input with proof."""
         period = self._settings.period_s
-        step, prediction = self._linearise(q, fixed.drive + period * speed, fixed.load, speed)
-        problem = build_ioc(prediction, fixed.target, fixed.previous, fixed.low, fixed.high, self._weights)
-        solution = solve_ioc(problem, prediction, self._weights)
-        return step + period * (self.gain @ (solution.inputs - speed)), solution
+        change, prediction = self._linearise(q, fixed.drive + period * speed, fixed.load, speed)
+        program = build_ioc(prediction, fixed.target, fixed.previous, fixed.low, fixed.high, self._weights)
+        solution = solve_ioc(program, prediction, self._weights)
+        return change + period * (self.gain @ (solution.inputs - speed)), solution
 
     def sharpen(self) -> None:
-        """Nothing to do: (41) always ends with a whole Newton step."""
+        """Do nothing: (41) always ends with a whole Newton step."""
 
     def memory(self) -> Mapping[str, Kept]:
         """Return nothing: all but the last input is in the estimate."""
@@ -150,7 +156,9 @@ class LiteralIoc:
         q, load = self._load(at)
         target = make_target(self._settings, at.reference, at.shift, self._robot.n_cables)
         fixed = Fixed(at.estimate.drive.copy(), load, target, at.previous, at.low, at.high)
-        speed, change, iteration = at.previous, np.inf, 0
+        speed = at.previous
+        change = np.inf
+        iteration = 0
         solution = Solution(speed, np.inf, 0, False, 0)
         while change > EPSILON and iteration < MAX_ITERATIONS and np.all(np.isfinite(q)):
             moved, solution = self._iterate(q, speed, fixed)

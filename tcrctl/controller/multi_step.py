@@ -39,14 +39,14 @@ from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, StaticMap, follow, r
 from tcrctl.signals import Array, Estimate
 
 
-class Memory(NamedTuple):
+class MultiStepMemory(NamedTuple):
     """What the predictor keeps from step to step, changed in place.
 
     Attributes:
         at: Where the model is at rest.
         offset: Δ (3 n_nodes,) [m].
         v: Velocities of the last estimate (3 n_nodes,) [m/s].
-        basis: Basis of the response (12 n_modules, modes + m).
+        basis: Basis of the response (n_free, modes + m).
     """
 
     at: StaticMap
@@ -57,7 +57,13 @@ class Memory(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _update_offset(
-    model: Model, ws: Workspace, memory: Memory, deviation: Array, v: Array, period: float, blend: float
+    model: Model,
+    ws: Workspace,
+    memory: MultiStepMemory,
+    deviation: Array,
+    v: Array,
+    period: float,
+    blend: float,
 ) -> None:
     """Filter the displacement of the point that the robot vibrates about: δ + K^-1 M (a + α v)."""
     force, lag = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
@@ -74,7 +80,14 @@ def _update_offset(
 
 @njit(cache=True, error_model="numpy")
 def forecast(
-    model: Model, load: Load, ws: Workspace, memory: Memory, now: Now, grid: Grid, tip: int, tuning: Tuning
+    model: Model,
+    load: Load,
+    ws: Workspace,
+    memory: MultiStepMemory,
+    now: Now,
+    grid: Grid,
+    tip: int,
+    tuning: Tuning,
 ) -> tuple[Outcome, bool, Array, Array]:
     """Make one prediction as in the module's docstring, in one kernel.
 
@@ -93,7 +106,9 @@ def forecast(
     """
     at, q, v = memory.at, now.q, now.v
     outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
-    deviation, away, finite = np.empty(q.shape[0]), np.empty(q.shape[0]), True
+    deviation = np.empty(q.shape[0])
+    away = np.empty(q.shape[0])
+    finite = True
     for k in range(q.shape[0]):
         deviation[k] = q[k] - at.equilibrium[k]
         finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
@@ -116,12 +131,13 @@ class MultiStep:
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
         self._tuning = make_tuning(period, settings.filter_s)
-        self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
+        self._work = make_workspace(robot.model)
+        self._load = static_load(robot.model, robot.weight)
         at, still = rest_map(robot), np.zeros_like(robot.rest.q)
         q, drive = robot.rest.q.copy(), np.zeros(robot.n_cables)
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         basis = response.start_basis(robot.model, self._work, settings.modes)
-        self._memory = Memory(at, still, still.copy(), basis)
+        self._memory = MultiStepMemory(at, still, still.copy(), basis)
         self._solved = False
         self._fresh = settings.offset is not None and settings.offset.from_start
         self._gap = TensionGap(settings.tension_gap, period, robot.n_cables)

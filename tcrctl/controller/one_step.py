@@ -36,7 +36,8 @@ class OneStep:
         del period
         self._robot, self._horizon = robot, settings.horizon_s
         self.grid = make_grid(1, 1, settings.horizon_s)
-        self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
+        self._work = make_workspace(robot.model)
+        self._scratch = dynamics.make_scratch(robot.model)
         self._gain = np.zeros((self._work.r.shape[0], robot.n_cables))
         self._column = np.zeros(self._work.r.shape[0])
         self._tolerance = TOLERANCE
@@ -58,17 +59,19 @@ class OneStep:
 
     def _load(self, q: Array, v: Array, drive: Array) -> Load:
         """Return the load of backward Euler over the horizon from (q, v, d)."""
-        step, s = self._horizon, self._scratch
-        inertia = 1.0 / step**2 + self._robot.model.damping / step
-        s.nodal[Q_FREE] = q + v / (step * inertia)
+        horizon, s = self._horizon, self._scratch
+        inertia = 1.0 / horizon**2 + self._robot.model.damping / horizon
+        s.nodal[Q_FREE] = q + v / (horizon * inertia)
         s.nodal[FORCE] = self._robot.weight
         dynamics.lengths_before(self._robot.model, q, v, drive, np.zeros_like(drive), 0.0, s, self._work)
-        return Load(inertia, 1.0 / step, s.nodal, s.bar_before, s.cable_before, None)
+        return Load(inertia, 1.0 / horizon, s.nodal, s.bar_before, s.cable_before, None)
 
     def predict(self, estimate: Estimate, age: float, outputs: Array, speed: Array) -> Forecast:
         """See :class:`Predictor`."""
         del outputs  # the step predicts outputs from the state itself
-        horizon, m, tip = self._horizon, speed.shape[0], self._robot.tip
+        horizon = self._horizon
+        m = speed.shape[0]
+        tip = self._robot.tip
         load = self._load(estimate.q + age * estimate.v, estimate.v, estimate.drive)
         q = self._guess.copy()
         drive = estimate.drive + horizon * speed

@@ -28,14 +28,14 @@ class OpenLoop:
         self.ahead = np.array([settings.period_s])
 
     def sharpen(self) -> None:
-        """Nothing is solved."""
+        """Do nothing: nothing is solved."""
 
     def memory(self) -> Mapping[str, Kept]:
         """Return nothing: nothing is remembered."""
         return {}
 
     def inner_map(self) -> None:
-        """Nothing is iterated."""
+        """Return None: nothing is iterated."""
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Return the command that brings the drives to their lengths by the end of the period, within the limits.

@@ -33,7 +33,9 @@ class Shell:
 
     def __init__(self, settings: IocSettings | KinematicSettings, robot: Robot, planner: Planner) -> None:
         """Put a planner into the shell."""
-        self._settings, self._robot, self._planner = settings, robot, planner
+        self._settings = settings
+        self._robot = robot
+        self._planner = planner
         self._integral = IntegralAction(settings.integral, settings.period_s)
         self._normal = robot.rest_normal if settings.output == "pose" else None
         self._speed = np.zeros(robot.n_cables)

@@ -34,7 +34,7 @@ from tcrctl.robot.statics import StaticMap, follow, rest_map, static_outputs
 from tcrctl.signals import Array, Estimate
 
 
-class Memory(NamedTuple):
+class StaticMemory(NamedTuple):
     """What the predictor keeps from step to step, changed in place.
 
     Attributes:
@@ -48,7 +48,14 @@ class Memory(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def forecast(
-    model: Model, load: Load, ws: Workspace, memory: Memory, now: Now, grid: Grid, tip: int, tuning: Tuning
+    model: Model,
+    load: Load,
+    ws: Workspace,
+    memory: StaticMemory,
+    now: Now,
+    grid: Grid,
+    tip: int,
+    tuning: Tuning,
 ) -> tuple[Outcome, Array, Array]:
     """Make one prediction as in the module's docstring, in one kernel.
 
@@ -65,7 +72,9 @@ def forecast(
     Returns:
         Outcome of the statics, free (n, 7 + m), gain (n, 7 + m, blocks * m).
     """
-    at, offset, blend = memory.at, memory.offset, tuning.blend
+    at = memory.at
+    offset = memory.offset
+    blend = tuning.blend
     outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
     rest, answer = static_outputs(model, ws, at, tip)
     if outcome.converged and blend > 0.0 and np.isfinite(now.outputs).all():
@@ -85,8 +94,9 @@ class Static:
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
         self._tuning = make_tuning(period, settings.filter_s)
-        self._work, self._load = make_workspace(robot.model), static_load(robot.model, robot.weight)
-        self._memory = Memory(rest_map(robot), np.zeros(POSE_ROWS + robot.n_cables))
+        self._work = make_workspace(robot.model)
+        self._load = static_load(robot.model, robot.weight)
+        self._memory = StaticMemory(rest_map(robot), np.zeros(POSE_ROWS + robot.n_cables))
         self._solved = False
 
     def sharpen(self) -> None:

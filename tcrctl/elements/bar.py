@@ -23,7 +23,7 @@ REST, STIFFNESS, DAMPING, TENSION_ONLY = range(4)
 
 @njit(cache=True, error_model="numpy")
 def direction(q: Array, i: int, j: int) -> tuple[float, float, float, float]:
-    """Length [m] and unit vector of the line from node i to node j in ``q`` (3 n_nodes,)."""
+    """Return the length [m] and unit vector of the line from node i to node j in ``q`` (3 n_nodes,)."""
     dx = q[3 * j] - q[3 * i]
     dy = q[3 * j + 1] - q[3 * i + 1]
     dz = q[3 * j + 2] - q[3 * i + 2]
@@ -33,7 +33,7 @@ def direction(q: Array, i: int, j: int) -> tuple[float, float, float, float]:
 
 @njit(cache=True, error_model="numpy")
 def tension(length: float, w: float, before: float, bars: Array, b: int) -> float:
-    """Tension T [N] of bar ``b`` at ``length`` [m] with dl/dt = w (length - before)."""
+    """Return the tension T [N] of bar ``b`` at ``length`` [m] with dl/dt = w (length - before)."""
     T = bars[b, STIFFNESS] * (length - bars[b, REST]) + bars[b, DAMPING] * w * (length - before)
     if T < 0.0 and bars[b, TENSION_ONLY] != 0.0:
         return 0.0

@@ -1,17 +1,17 @@
 """A cable that rubs in its holes: capstan law with real sticking, in the form of one convex problem per step.
 
-The cable is a chain of stretches: stretch h ends at hole h (stretch 0 is the lead, from the actuator to the base
-ring), and material may slip through every hole but the last, which is the anchor. With the elongation e_h of a
-stretch at slips that have not moved, and the slips s_h of one time step, the incremental potential of a cable is
+The cable is a chain of stretches: stretch i ends at hole i (stretch 0 is the lead, from the actuator to the base
+ring), and material may slip through every hole but the last, which is the anchor. With the elongation e_i of a
+stretch at slips that have not moved, and the slips s_i of one internal step, a cable's incremental potential is
 
-    min_s  Σ_h k_h/2 (e_h + s_h - s_(h-1))₊²  +  Σ_h F_h |s_h|,     F_h = min(T_h, T_(h+1)) (exp(μ θ_h) - 1) + drag
+    min_s  Σ_i k_i/2 (e_i + s_i - s_(i-1))₊²  +  Σ_i F_i |s_i|,     F_i = min(T_i, T_(i+1)) (exp(μ θ_i) - 1) + drag
 
-F_h is lagged: it belongs to the tensions T and wrap angles θ of the last step, which makes the problem convex, and
-dissipation F_h |s_h| never negative. Its dual is a separable quadratic in the tensions under
-|T_h - T_(h+1)| <= F_h, T >= 0, solved exactly by one pass along the chain (dynamic programming on piecewise linear
-derivatives): holes whose bound is not active *stick*, s_h = 0 to the last bit. Stretches between sticking holes
-form groups whose tensions move together, in series: 1 / k = Σ 1 / k_h. Source of the capstan law: [SC26].
-"""  # fmt: skip
+F_i is lagged: it belongs to the tensions T and wrap angles θ of the last step, which makes the problem convex, and
+dissipation F_i |s_i| never negative. Its dual is a separable quadratic in the tensions under
+|T_i - T_(i+1)| <= F_i, T >= 0, solved exactly by one pass along the chain (dynamic programming on piecewise linear
+derivatives): holes whose bound is not active *stick*, s_i = 0 to the last bit. Stretches between sticking holes
+form groups whose tensions move together, in series: 1 / k = Σ 1 / k_i. Source of the capstan law: [SC26].
+"""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Slip(NamedTuple):
 
     Attributes:
         holes: Friction of every hole (n_holes, 3), columns as above; anchors are not read.
-        stiffness: k_h = EA / rest length of the stretch that ends at hole h [N/m].
+        stiffness: k_i = EA / rest length of the stretch that ends at hole i [N/m].
         rest: Its unstretched length [m].
-        tension: Its tension T_h [N].
-        cap: F_h, largest difference of tension across hole h [N].
-        before: Elongations at the start of the step [m], for the damper.
+        tension: Its tension T_i [N].
+        cap: F_i, largest difference of tension across hole i [N].
+        before: Elongations at the start of the internal step [m], for the damper.
         rate: 1 element: w of backward Euler, dl/dt = w (e - before) [1/s]; 0 in statics.
     """
 
@@ -54,12 +54,12 @@ class Stretches(NamedTuple):
 
     Attributes:
         length: Lengths [m]; leads with the drive length.
-        direction: Unit vectors from hole h - 1 to hole h (n_holes, 3).
-        tension: T_h [N].
+        direction: Unit vectors from hole i - 1 to hole i (n_holes, 3).
+        tension: T_i [N].
         axial: Stiffness of a group that holds one stretch between two rings [N/m]; 0 of all others.
-        stiffness: k_h with the damper of the rule [N/m].
+        stiffness: k_i with the damper of the rule [N/m].
         wanted: Tensions that the stretches would have if all holes stuck, may be negative [N].
-        alone: T_h at which the chain up to h would rest if it ended there [N].
+        alone: T_i at which the chain up to i would rest if it ended there [N].
         knots: Derivative of the chain's cost by its last tension: places [N] and values [m] of its corners
             (2, 4 n + 4).
         groups: 1 element: rows of G in use.
@@ -86,7 +86,7 @@ WALL = 1e6
 
 @njit(cache=True, error_model="numpy")
 def _first_positive(y: Array, n: int) -> int:
-    """Index of the first of n increasing values that is not negative; n if all are."""
+    """Return the index of the first of n increasing values that is not negative; n if all are."""
     for i in range(n):
         if y[i] >= 0.0:
             return i
@@ -95,7 +95,7 @@ def _first_positive(y: Array, n: int) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _root(x: Array, y: Array, n: int, right: float) -> float:
-    """Where the increasing function through n corners (x, y) is zero; y[0] < 0, slope ``right`` behind the last."""
+    """Find the zero of the increasing function through n corners (x, y); y[0] < 0, slope ``right`` at the end."""
     i = _first_positive(y, n)
     if i == n:
         return float(x[n - 1] - y[n - 1] / right)
@@ -140,23 +140,23 @@ def _only_taut(x: Array, y: Array, n: int, right: float) -> int:
 
 @njit(cache=True, error_model="numpy")
 def solve_chain(s: Stretches, cap: Array, first: int, last: int) -> None:
-    """Tensions of one cable, stretches ``first`` .. ``last``: fills tension and alone from wanted and stiffness."""
+    """Solve one cable, stretches ``first`` .. ``last``: fills tension and alone from wanted and stiffness."""
     x, y = s.knots[0], s.knots[1]
     x[0], y[0], x[1], y[1] = 0.0, -WALL, 0.0, -s.wanted[first] / s.stiffness[first]
     n, right = 2, 1.0 / s.stiffness[first]
-    for h in range(first, last + 1):
-        s.alone[h] = _root(x, y, n, right)
-        if h < last:
-            n = _widen(x, y, n, s.alone[h], cap[h])
+    for hole in range(first, last + 1):
+        s.alone[hole] = _root(x, y, n, right)
+        if hole < last:
+            n = _widen(x, y, n, s.alone[hole], cap[hole])
             n = _only_taut(x, y, n, right)
-            k = s.stiffness[h + 1]
+            k = s.stiffness[hole + 1]
             for i in range(n):
-                y[i] += (x[i] - s.wanted[h + 1]) / k
+                y[i] += (x[i] - s.wanted[hole + 1]) / k
             right += 1.0 / k
     s.tension[last] = s.alone[last]
-    for h in range(last - 1, first - 1, -1):
-        T, F = s.tension[h + 1], cap[h]
-        s.tension[h] = min(max(s.alone[h], T - F), T + F)
+    for hole in range(last - 1, first - 1, -1):
+        T, F = s.tension[hole + 1], cap[hole]
+        s.tension[hole] = min(max(s.alone[hole], T - F), T + F)
 
 
 @njit(cache=True, error_model="numpy")
@@ -173,10 +173,10 @@ def measure(
     for c in range(drive.shape[0]):
         first = first_hole[c]
         s.length[first] = cables[c, sliding_cable.LEAD] + drive[c]
-        for h in range(first + 1, first_hole[c + 1]):
-            s.length[h], s.direction[h, 0], s.direction[h, 1], s.direction[h, 2] = sliding_cable.segment(
-                q, nodes, weights, h - 1
-            )
+        for hole in range(first + 1, first_hole[c + 1]):
+            length, ex, ey, ez = sliding_cable.segment(q, nodes, weights, hole - 1)
+            s.length[hole] = length
+            s.direction[hole, 0], s.direction[hole, 1], s.direction[hole, 2] = ex, ey, ez
 
 
 @njit(cache=True, error_model="numpy")
@@ -184,7 +184,7 @@ def tensions(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) ->
     """Fill tensions of all stretches from their lengths; returns the incremental potential of all cables [J].
 
     Args:
-        slip: State at the start of the step.
+        slip: State at the start of the internal step.
         cables: Parameters (m, 4), columns as in ``sliding_cable``; the damper acts on every stretch with c / k.
         first_hole: First hole of every cable, and the end (m + 1,).
         s: Lengths in, tensions out.
@@ -193,46 +193,46 @@ def tensions(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) ->
     for c in range(cables.shape[0]):
         first, last = first_hole[c], first_hole[c + 1] - 1
         b = slip.rate[0] * cables[c, sliding_cable.DAMPING] / cables[c, sliding_cable.STIFFNESS]
-        for h in range(first, last + 1):
-            s.stiffness[h] = slip.stiffness[h] * (1.0 + b)
-            elongation = s.length[h] - slip.rest[h] - b * slip.before[h] / (1.0 + b)
-            s.wanted[h] = s.stiffness[h] * elongation
+        for hole in range(first, last + 1):
+            s.stiffness[hole] = slip.stiffness[hole] * (1.0 + b)
+            elongation = s.length[hole] - slip.rest[hole] - b * slip.before[hole] / (1.0 + b)
+            s.wanted[hole] = s.stiffness[hole] * elongation
         solve_chain(s, slip.cap, first, last)
-        for h in range(first, last + 1):
-            T = s.tension[h]
-            energy += T * (s.wanted[h] - 0.5 * T) / s.stiffness[h]
+        for hole in range(first, last + 1):
+            T = s.tension[hole]
+            energy += T * (s.wanted[hole] - 0.5 * T) / s.stiffness[hole]
     return energy
 
 
 @njit(cache=True, error_model="numpy")
-def group_start(s: Stretches, first: int, h: int) -> int:
-    """First stretch of the group that ends with stretch ``h``: holes between them slip."""
-    while h > first and s.tension[h - 1] != s.alone[h - 1]:
-        h -= 1
-    return h
+def group_start(s: Stretches, first: int, stretch: int) -> int:
+    """Return the first stretch of the group that ends with ``stretch``: holes between them slip."""
+    while stretch > first and s.tension[stretch - 1] != s.alone[stretch - 1]:
+        stretch -= 1
+    return stretch
 
 
 @njit(cache=True, error_model="numpy")
 def group_stiffness(s: Stretches, start: int, end: int) -> float:
-    """Stiffness of stretches ``start`` .. ``end`` in series [N/m]; 0 if slackness holds their tension."""
+    """Return stiffness of stretches ``start`` .. ``end`` in series [N/m]; 0 if slackness holds their tension."""
     if s.alone[end] <= 0.0:
         return 0.0
     compliance = 0.0
-    for h in range(start, end + 1):
-        compliance += 1.0 / s.stiffness[h]
+    for stretch in range(start, end + 1):
+        compliance += 1.0 / s.stiffness[stretch]
     return float(1.0 / compliance)
 
 
 @njit(cache=True, error_model="numpy")
 def begin(slip: Slip, h: float, lead: Array, first_hole: np.ndarray, s: Stretches) -> None:
-    """Start a step of size ``h`` [s]: elongations before it, and the caps of the holes there.
+    """Start an internal step of size ``h`` [s]: elongations before it, and the caps of the holes there.
 
     Args:
         slip: State; its before, cap and rate are filled.
-        h: Step [s].
+        h: Internal step [s].
         lead: Unit vector from the actuators to the base ring (3,).
         first_hole: First hole of every cable, and the end (m + 1,).
-        s: Lengths and directions at the start of the step.
+        s: Lengths and directions at the start of the internal step.
     """
     slip.rate[0] = 1.0 / h
     for c in range(first_hole.shape[0] - 1):
@@ -250,7 +250,7 @@ def begin(slip: Slip, h: float, lead: Array, first_hole: np.ndarray, s: Stretche
 
 @njit(cache=True, error_model="numpy")
 def finish(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) -> float:
-    """Move the material through the holes to the end of a step; returns the work of friction Σ F |s| [J].
+    """Move the material through the holes to the end of an internal step; returns the work of friction Σ F |s| [J].
 
     A hole that sticks lets nothing through; a slack stretch takes what comes if it can.
     """

@@ -17,7 +17,7 @@ TURN_THIRD = 2.0 * math.pi / 3.0
 
 
 def point_weights(angle: float) -> Array:
-    """Weights (3,) of the ring's nodes for the point at ``angle`` [rad] counter-clockwise from node 1.
+    """Return the weights (3,) of the ring's nodes for the point at ``angle`` [rad] counter-clockwise from node 1.
 
     (2) with n_i = r_i - r_o and r_o = (r_1 + r_2 + r_3) / 3 multiplied out; angles θ - 2π/3 and θ - 4π/3
     because the nodes are numbered counter-clockwise (REFERENCES.md, correction 1). The weights sum to 1.
@@ -29,10 +29,10 @@ def point_weights(angle: float) -> Array:
 
 
 def node_mass(mass: float) -> float:
-    """Mass [kg] of each node of a ring of ``mass`` [kg]: M_s = (2π/3) ρ b I_9 = mass / 3 I_9, (4)."""
+    """Return the mass [kg] of each node of a ring of ``mass`` [kg]: M_s = (2π/3) ρ b I_9 = mass / 3 I_9, (4)."""
     return mass / 3.0
 
 
 def sides(nodes: tuple[int, int, int]) -> list[tuple[int, int]]:
-    """The three virtual rods of (5) as pairs of node numbers."""
+    """Return the three virtual rods of (5) as pairs of node numbers."""
     return [(nodes[0], nodes[1]), (nodes[1], nodes[2]), (nodes[2], nodes[0])]

@@ -25,7 +25,7 @@ from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.rigid_transform import RigidTransform
-from tcrctl.emulate.fault_script import FaultScript, Player
+from tcrctl.emulate.fault_script import FaultPlayer, FaultScript
 from tcrctl.emulate.imperfections import Imperfections
 from tcrctl.emulate.robot import EmulatedRobot
 from tcrctl.emulate.settings import EmulationSettings
@@ -70,7 +70,9 @@ class EmulatedBench:
             InputError: If the rig file cannot be emulated.
             DeviceError: If the port of the cameras is taken.
         """
-        self._rig, self._settings, built = rig, settings, robots or {}
+        self._rig = rig
+        self._settings = settings
+        built = robots or {}
         self._random = np.random.default_rng(settings.seed)
         self._failure: Exception | None = None
         self.plcs: dict[str, PlcEmulator] = {}
@@ -115,7 +117,7 @@ class EmulatedBench:
         return EmulatedRobot(real.robot, real.plant, drives, tensions)
 
     def _markers(self) -> Array:
-        """All markers in the frame of the cameras (n, 3) [m]."""
+        """Return all markers in the frame of the cameras (n, 3) [m]."""
         try:
             exact = np.concatenate([self._seen(name) for name in self.robots])
         except Exception as error:
@@ -128,7 +130,7 @@ class EmulatedBench:
         return np.asarray(noisy)
 
     def _seen(self, name: str) -> Array:
-        """Markers of one robot in the frame of the cameras (3 + 3 n_modules, 3) [m]."""
+        """Return the markers of one robot in the frame of the cameras (3 + 3 n_modules, 3) [m]."""
         return self._back[name].inverse_apply(self._real[name].markers(self.robots[name].rings()))
 
     def __enter__(self) -> Self:
@@ -166,7 +168,7 @@ class EmulatedBench:
             raise self._failure
 
     def as_json(self) -> dict[str, Any]:
-        """What the bench is doing, for ``tcrctl emulate --json``."""
+        """Say what the bench is doing, for ``tcrctl emulate --json``."""
         return {
             "rig": self._rig.name,
             "cameras": {"frames": self.motive.frames_sent, "clients": self.motive.clients},
@@ -198,7 +200,7 @@ def emulate(
     Raises:
         DivergenceError: If a simulation broke down.
     """
-    player = Player(script, bench.motive, bench.plcs, notify) if script else None
+    player = FaultPlayer(script, bench.motive, bench.plcs, notify) if script else None
     begun = time.monotonic()
     while not stop():
         if player is not None:
@@ -217,7 +219,7 @@ def _address(mounted: MountedRobot) -> tuple[str, int]:
 
 
 def marker_names(rig: RigFile) -> list[str]:
-    """Names of all markers on a rig, as Motive streams them.
+    """Return the names of all markers on a rig, as Motive streams them.
 
     Args:
         rig: The bench.
@@ -233,7 +235,7 @@ def marker_names(rig: RigFile) -> list[str]:
 
 
 def _labels(mounted: MountedRobot, modules: int) -> list[str]:
-    """Names of all markers of a robot: base ring, then ring by ring."""
+    """Return the names of all markers of a robot: base ring, then ring by ring."""
     markers = mounted.markers
     if markers.labels is None:
         raise InputError("markers.labels is needed to emulate a rig; markers.nodes alone is not enough")

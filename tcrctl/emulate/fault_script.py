@@ -83,7 +83,7 @@ def _unknown(fault: Fault) -> Iterator[Finding]:
 
 
 def _wrong_value(name: str, value: Any) -> str:
-    """What is wrong with the value of a camera fault; empty if nothing is."""
+    """Say what is wrong with the value of a camera fault; empty if nothing is."""
     try:
         taken = camera_value(name, value)
     except (TypeError, ValueError) as error:
@@ -164,7 +164,7 @@ def load_fault_script(
 def _strangers(
     fault: Fault, at: Keys, robots: Collection[str] | None, markers: Collection[str] | None
 ) -> Iterator[Finding]:
-    """Names in a fault that nobody on the rig has."""
+    """Return the names in a fault that nobody on the rig has."""
     if robots is not None and fault.robot is not None and fault.robot not in robots:
         yield (*at, "robot"), f"there is no robot {fault.robot} on the rig; there are {', '.join(robots)}"
     for key, value in fault.cameras.items() if isinstance(fault.cameras, dict) else ():
@@ -176,7 +176,7 @@ def _strangers(
             yield (*at, "cameras", key), f"there is no marker {', '.join(unknown)}; there are {some}, ..."
 
 
-class Player:
+class FaultPlayer:
     """Lets the faults of a script happen."""
 
     def __init__(
@@ -187,8 +187,10 @@ class Player:
         notify: Callable[[str], None],
     ) -> None:
         """Take a script; ``notify`` takes what happens, for people."""
-        self._motive, self._plcs, self._notify = motive, plcs, notify
-        self._names = motive.scene.names
+        self._motive = motive
+        self._plcs = plcs
+        self._notify = notify
+        self._names = motive.tracked.names
         self._waiting = list(script.faults)
         self._active: list[tuple[float, Fault]] = []
         self._since: dict[str, float] = {"start": 0.0}

@@ -53,7 +53,9 @@ class EmulatedRobot:
         """
         robot = moving_robot(settings, robot)
         self.robot, self.slipped = robot, 0.0
-        self._drives, self._tensions, self._clock = drives, tensions, clock
+        self._drives = drives
+        self._tensions = tensions
+        self._clock = clock
         self._cable = np.asarray(drives(), dtype=float)
         self._body = Body(settings.model_copy(update={"step_ms": 1e3 * STEP}), robot, self._cable)
         self._relaxes = relaxes(settings)
@@ -61,7 +63,7 @@ class EmulatedRobot:
         self._rings = np.array([*ring_nodes(0), *ring_rows(robot.n_modules)])
 
     def rings(self) -> Array:
-        """All ring nodes now, those of the base first (3 + 3 n_modules, 3) [m].
+        """Return all ring nodes now, those of the base first (3 + 3 n_modules, 3) [m].
 
         Raises:
             DivergenceError: If the simulation broke down.

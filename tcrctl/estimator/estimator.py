@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol
 
 from tcrctl.config.settings import Settings
-from tcrctl.estimator.exact import State, build_exact
+from tcrctl.estimator.exact import TrueState, build_exact
 from tcrctl.estimator.passive_observer import build_observer
 from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
 from tcrctl.robot.robot import Robot
@@ -21,7 +21,7 @@ class Estimator(Protocol):
         ...
 
 
-Builder = Callable[[Any, Robot, float, State | None], Estimator]
+Builder = Callable[[Any, Robot, float, TrueState | None], Estimator]
 
 #: Section and builder of every ``estimator.kind``.
 KINDS: Final[Mapping[str, tuple[type[Settings], Builder]]] = {
@@ -31,7 +31,7 @@ KINDS: Final[Mapping[str, tuple[type[Settings], Builder]]] = {
 
 
 def build_estimator(
-    settings: EstimatorSettings, robot: Robot, period: float, state: State | None
+    settings: EstimatorSettings, robot: Robot, period: float, state: TrueState | None
 ) -> Estimator:
     """Build the estimator of an ``estimator:`` section.
 

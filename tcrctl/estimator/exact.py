@@ -14,17 +14,18 @@ from tcrctl.robot import pose
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, Estimate, Measurement
 
-State = Callable[[], tuple[Array, Array]]
+TrueState = Callable[[], tuple[Array, Array]]
+"""Returns positions and velocities (3 n_nodes,) each [m], [m/s]."""
 
 
 class ExactState:
     """Passes on what ``state`` returns: true positions and velocities (3 n_nodes,) each."""
 
-    def __init__(self, robot: Robot, state: State) -> None:
+    def __init__(self, robot: Robot, state: TrueState) -> None:
         self._robot, self._state = robot, state
 
     def memory(self) -> Mapping[str, Kept]:
-        """Nothing: the plant remembers."""
+        """Return nothing: the plant remembers."""
         return {}
 
     def update(self, measured: Measurement, applied: Command) -> Estimate:
@@ -32,7 +33,8 @@ class ExactState:
         del applied
         q, v = self._state()
         model, tip = self._robot.model, self._robot.tip
-        length, gradient = np.zeros(self._robot.n_cables), np.zeros((self._robot.n_cables, q.shape[0]))
+        length = np.zeros(self._robot.n_cables)
+        gradient = np.zeros((self._robot.n_cables, q.shape[0]))
         sliding_cable.path_gradients(
             q, model.first_hole, model.hole_nodes, model.hole_weights, model.cables, length, gradient
         )
@@ -50,7 +52,7 @@ class ExactState:
         )
 
 
-def build_exact(settings: ExactSettings, robot: Robot, period: float, state: State | None) -> ExactState:
+def build_exact(settings: ExactSettings, robot: Robot, period: float, state: TrueState | None) -> ExactState:
     """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`.
 
     Raises:

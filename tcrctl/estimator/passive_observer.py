@@ -23,7 +23,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tcrctl.estimator.exact import State
+from tcrctl.estimator.exact import TrueState
 from tcrctl.estimator.lost_markers import LostMarkers
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.memory import NORMAL, POSITION, SPEED, Kept
@@ -58,15 +58,19 @@ class PassiveObserver:
         self._correction = np.zeros(6)
         self._updates = 0
         self._fits, self._holds = settings.fit_start, settings.hold_blank
-        self._frame, self._frame_valid = np.zeros((rows.size, 3)), np.zeros(rows.size, dtype=np.bool_)
+        self._frame = np.zeros((rows.size, 3))
+        self._frame_valid = np.zeros(rows.size, dtype=np.bool_)
         self._lost = LostMarkers(rows.size, period)
-        self._work, self._scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
+        self._work = make_workspace(robot.model)
+        self._scratch = dynamics.make_scratch(robot.model)
         self._scratch.nodal[FORCE] = robot.weight
         self._valid, self._seen = np.zeros(rows.shape[0], dtype=np.bool_), self._coordinates[:0]
 
     def _load(self, measured: Measurement) -> Load:
-        """Inertia of backward Euler, weight and virtual springs of one update."""
-        period, s, model = self._period, self._scratch, self._robot.model
+        """Return the inertia of backward Euler, weight and virtual springs of one update."""
+        period = self._period
+        s = self._scratch
+        model = self._robot.model
         inertia = 1.0 / period**2 + model.damping / period
         s.nodal[Q_FREE] = self._q + self._v / (period * inertia)
         if not np.array_equal(measured.valid, self._valid):
@@ -97,9 +101,13 @@ class PassiveObserver:
         So the robot does not seem to jump there in a step. Without a solution the model stays at its own rest.
         """
         still = self._load(measured)._replace(inertia=0.0, w=0.0)
-        model, q, drive = self._robot.model, self._q.copy(), measured.drive.copy()
+        model = self._robot.model
+        q = self._q.copy()
+        drive = measured.drive.copy()
         if minimise(model, q, drive, still, self._work, TOLERANCE, FIT_ITERATIONS, False).converged:
-            self._q, self._v, self._drive = q, np.zeros_like(q), drive
+            self._q = q
+            self._v = np.zeros_like(q)
+            self._drive = drive
 
     def _correct(self, measured: Measurement) -> tuple[Array, Array]:
         """End position and normal, corrected by what the tip ring's markers say."""
@@ -159,7 +167,7 @@ class PassiveObserver:
 
 
 def build_observer(
-    settings: PassiveObserverSettings, robot: Robot, period: float, state: State | None
+    settings: PassiveObserverSettings, robot: Robot, period: float, state: TrueState | None
 ) -> PassiveObserver:
     """Build the estimator; see :func:`tcrctl.estimator.estimator.build_estimator`."""
     del state

@@ -64,7 +64,7 @@ def cluster_workers(
 
 
 def environment() -> dict[str, str]:
-    """What libraries of this process read from the environment, and those of workers should too."""
+    """Return what libraries of this process read from the environment, and those of workers should too."""
     return {name: os.environ[name] for name in _VARIABLES if name in os.environ}
 
 

@@ -18,12 +18,12 @@ _SIBLINGS: Final = "/sys/devices/system/cpu/cpu{}/topology/thread_siblings_list"
 
 
 def available_cores() -> int:
-    """Logical cores that this process may use."""
+    """Return the logical cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def physical_cores() -> int:
-    """Physical cores among those; two threads of one core only wait for each other in this kind of work."""
+    """Return the physical cores among those: two threads of one core only wait for each other in this work."""
     if not hasattr(os, "sched_getaffinity"):
         return available_cores()
     try:

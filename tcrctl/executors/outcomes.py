@@ -104,7 +104,7 @@ class _Work(Generic[T, R]):
         return False
 
     def _handed_out(self, workers: Workers) -> bool:
-        """Hand out what there is room for, what is suspected alone; False if there is nothing left."""
+        """Hand out what there is room for, what is suspected alone; return False if there is nothing left."""
         while len(self.flight) < (1 if self.suspects or self.on_trial else workers.width):
             queue = self.suspects or self.again
             self.on_trial = bool(self.suspects)
@@ -153,7 +153,7 @@ class _Work(Generic[T, R]):
         raise BrokenExecutor
 
     def _lost(self) -> Iterator[tuple[T, R | Crash]]:
-        """What was in the air is suspected; what dies alone twice in a row is found guilty."""
+        """Suspect what was in the air; find guilty what dies alone twice in a row."""
         lost = [item for item, _ in self.flight.values()]
         self.flight.clear()
         if not self.on_trial:

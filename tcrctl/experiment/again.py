@@ -55,13 +55,13 @@ def _load_run(folder: Path, overrides: Sequence[str]) -> LoadedSpec:
 
 
 def _replaced(key: str, given: set[str]) -> bool:
-    """Whether the user gives a key, or a section around it, or its kind."""
+    """Tell whether the user gives a key, or a section around it, or its kind."""
     section = key.partition(".")[0]
     return bool({key, section, f"{section}.kind"} & given)
 
 
 def _names(spec: Path) -> dict[str, Any]:
-    """Names of robots and rig as the user wrote them, by dotted key."""
+    """Return the names of robots and rig as the user wrote them, by dotted key."""
     data = strict_yaml.load(spec).data
     names = {"robot": data.get("robot")}
     plant = data.get("plant")
@@ -71,7 +71,7 @@ def _names(spec: Path) -> dict[str, Any]:
 
 
 def _as_named(loaded: LoadedSpec, names: dict[str, Any], meant: dict[str, Path]) -> ExperimentSpec:
-    """The experiment with the names of the files, so that it is written again as it was."""
+    """Return the experiment with the names of the files, so that it is written again as it was."""
     spec = loaded.spec
     plant = {key.partition(".")[2]: names[key] for key in meant if key.startswith("plant.")}
     changes: dict[str, Any] = {"plant": spec.plant.model_copy(update=plant)} if plant else {}

@@ -88,7 +88,7 @@ class StaticPath:
         return speed
 
     def as_json(self) -> dict[str, dict[str, float]]:
-        """Extremes for ``run --dry-run --json``."""
+        """Return the extremes for ``run --dry-run --json``."""
         return {
             "drive_mm": {"min": 1e3 * float(self.drive.min()), "max": 1e3 * float(self.drive.max())},
             "drive_speed_mm_s": {"max": 1e3 * float(np.abs(self.speed).max())},
@@ -228,7 +228,7 @@ def _newton_step(robot: Robot, target: Array, held: Held, limits: DriveLimits) -
 
 
 def _tensions(robot: Robot, held: Held) -> tuple[Array, Array]:
-    """Tensions (m,) [N], negative for what a slack cable lacks, and their derivatives (m, m) [N/m]."""
+    """Return the tensions (m,) [N], negative for what a slack cable lacks, and their derivatives (m, m) [N/m]."""
     model, q = robot.model, held.shape.q
     length, G = np.zeros(robot.n_cables), np.zeros((robot.n_cables, q.size))
     sliding_cable.path_gradients(
@@ -262,7 +262,8 @@ def _check_sample(path: StaticPath, i: int, rows: int, robot: Robot, limits: Dri
         speed = np.abs(drive - path.drive[i - 1]) / (path.time[i] - path.time[i - 1])
         fast = int(np.argmax(speed))
         if speed[fast] > limits.speed:
-            what, hint = f"speed of drive {names[fast]}", "Lower the speed limits of the trajectory."
+            what = f"speed of drive {names[fast]}"
+            hint = "Lower the speed limits of the trajectory."
             raise InfeasibleError(t, what, 1e3 * speed[fast], 1e3 * limits.speed, "mm/s", hint=hint)
 
 

@@ -11,9 +11,21 @@ from tcrctl.signals import Array, StepRecord
 
 #: Columns of the table that has one row per step.
 _COLUMNS = (
-    "error_x", "error_y", "error_z", "angle", "theta_x", "theta_y", "tension_min", "tension_max",
-    "saturated", "control", "latency", "overrun", "iterations", "unsolved",
-)  # fmt: skip
+    "error_x",
+    "error_y",
+    "error_z",
+    "angle",
+    "theta_x",
+    "theta_y",
+    "tension_min",
+    "tension_max",
+    "saturated",
+    "control",
+    "latency",
+    "overrun",
+    "iterations",
+    "unsolved",
+)
 
 
 class Metrics:
@@ -27,7 +39,9 @@ class Metrics:
             paced: Whether the clock paces the run, so that there are deadlines to miss.
         """
         self._table = np.full((steps, len(_COLUMNS)), np.nan)
-        self._steps, self._paced, self._period = 0, paced, 0.0
+        self._steps = 0
+        self._paced = paced
+        self._period = 0.0
 
     def add(self, step: StepRecord) -> None:
         """Take a step."""
@@ -41,7 +55,7 @@ class Metrics:
         self._steps += 1
 
     def measures(self) -> Measures:
-        """Everything that was measured so far."""
+        """Return everything that was measured so far."""
         table = dict(zip(_COLUMNS, self._table[: self._steps].T, strict=True))
         error = np.stack([table[f"error_{axis}"] for axis in "xyz"], axis=1)
         return Measures(
@@ -68,7 +82,7 @@ class Metrics:
 
 
 def _errors(step: StepRecord) -> tuple[float, ...]:
-    """Position error (3) [m], angle between the normals, errors of the angles of (45) [rad] or NaN."""
+    """Return the position error (3) [m], angle between the normals, errors of the angles of (45) [rad] or NaN."""
     end = step.estimate if step.truth is None else step.truth
     x, y, z = (end.position - step.reference.position).tolist()
     wanted = step.reference.normal
@@ -80,7 +94,7 @@ def _errors(step: StepRecord) -> tuple[float, ...]:
 
 
 def _wrapped(angle: float) -> float:
-    """Angle within ±pi [rad]."""
+    """Return the angle within ±pi [rad]."""
     return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
@@ -97,7 +111,7 @@ def _timing(step: StepRecord, paced: bool) -> tuple[float, ...]:
 
 
 def _latency(step: StepRecord, busy: float) -> float:
-    """Arrival of the camera frame to the answer of the drives [s]; NaN if the step has no frame.
+    """Return the time from the camera frame's arrival to the drives' answer [s]; NaN if the step has no frame.
 
     The run's clock leaves out steps that were missed, so a step that begins later than a period begins on time.
     """

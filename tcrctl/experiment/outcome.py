@@ -53,7 +53,7 @@ def summary_of(
 
 
 def _outcome(failure: TcrctlError | None, verdicts: tuple[Verdict, ...]) -> tuple[str, str, int]:
-    """Status, reason and exit code of a run."""
+    """Return the status, reason and exit code of a run."""
     if failure is not None:
         aborted = isinstance(failure, StoppedError | RunInterruptedError)
         return "aborted" if aborted else "error", str(failure), failure.exit_code

@@ -65,7 +65,7 @@ def _named(document: Document, name: str) -> RobotDescription:
 
 
 def _changed(document: Document, differences: Mapping[str, Any], robot_path: Path) -> RobotDescription:
-    """The controller's robot with some values of its file changed."""
+    """Return the controller's robot with some values of its file changed."""
     # pydantic is slow to import
     from tcrctl.config.validation import check
 

@@ -13,7 +13,7 @@ from tcrctl.controller.controller import build_controller
 from tcrctl.controller.settings import speed_limit
 from tcrctl.errors import InputError, StoppedError
 from tcrctl.estimator.estimator import build_estimator
-from tcrctl.estimator.exact import State
+from tcrctl.estimator.exact import TrueState
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.experiment.metrics import Metrics
@@ -23,8 +23,8 @@ from tcrctl.loop.loop import Parts, run_loop, step_count
 from tcrctl.loop.safety import SafetyGuard, SafetyLimits
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.realistic import rehearsal_plant
-from tcrctl.plant.rig.bench import build_rig
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.assembly import build_rig
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot import pose
@@ -41,11 +41,11 @@ START_READS: Final = 10
 WARM_UP_STEPS: Final = 3
 
 Notify = Callable[[str], None]
-PlantBuilder = Callable[[Any, "Experiment", Session], tuple[RunnablePlant, State | None]]
+PlantBuilder = Callable[[Any, "Experiment", Operation], tuple[RunnablePlant, TrueState | None]]
 
 
 def silent(text: str) -> None:
-    """Take a message for the user and drop it."""
+    """Discard a message for the user."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,21 +86,23 @@ class Experiment:
 
 
 def _simulated(
-    settings: SimulatedSettings, experiment: Experiment, session: Session
-) -> tuple[RunnablePlant, State]:
-    del session
-    loaded, spec, robot = experiment.loaded, experiment.spec, experiment.robot
+    settings: SimulatedSettings, experiment: Experiment, operation: Operation
+) -> tuple[RunnablePlant, TrueState]:
+    del operation
+    loaded = experiment.loaded
+    spec = experiment.spec
+    robot = experiment.robot
     own = description_of_plant(settings, loaded.robot, loaded.plant_robot, spec.seed, robot)
     robot = robot if own is None else build_robot(own)
     plant = SimulatedPlant(settings, robot, experiment.period, spec.seed)
     return plant, plant.state
 
 
-def _rig(settings: RigSettings, experiment: Experiment, session: Session) -> tuple[RunnablePlant, None]:
+def _rig(settings: RigSettings, experiment: Experiment, operation: Operation) -> tuple[RunnablePlant, None]:
     del settings  # the file that it names is loaded
     if experiment.loaded.rig is None:
         raise InputError("the experiment was loaded without a rig file")
-    return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, session), None
+    return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, operation), None
 
 
 #: Section and builder of every ``plant.kind``; it returns the plant, and its true state if it knows it.
@@ -170,12 +172,14 @@ def make_task(experiment: Experiment) -> Task | None:
     return build_task(spec.task, spec.seed, 1e-3 * modules.rod_diameter_mm) if spec.task else None
 
 
-def build_plant(experiment: Experiment, session: Session | None = None) -> tuple[RunnablePlant, State | None]:
+def build_plant(
+    experiment: Experiment, operation: Operation | None = None
+) -> tuple[RunnablePlant, TrueState | None]:
     """Build the plant; returns its true state too if it knows it.
 
     Args:
         experiment: What it is for.
-        session: What the plant may know of the run.
+        operation: What the plant may know of the run.
 
     Raises:
         DeviceError: If it cannot be reached.
@@ -183,10 +187,10 @@ def build_plant(experiment: Experiment, session: Session | None = None) -> tuple
     """
     settings = experiment.spec.plant
     _, build = PLANTS[settings.kind]
-    return build(settings, experiment, session or Session())
+    return build(settings, experiment, operation or Operation())
 
 
-def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> tuple[Parts, float]:
+def build_parts(experiment: Experiment, plant: Plant, state: TrueState | None) -> tuple[Parts, float]:
     """Build estimator and controller for a plant at rest, and let the trajectory begin where the plant is.
 
     Args:
@@ -202,7 +206,9 @@ def build_parts(experiment: Experiment, plant: Plant, state: State | None) -> tu
         InputError: If the estimator needs a state that is not known.
         DeviceError: If the plant cannot be measured.
     """
-    spec, robot, period = experiment.spec, experiment.robot, experiment.period
+    spec = experiment.spec
+    robot = experiment.robot
+    period = experiment.period
     trajectory, offset = experiment.trajectory, np.nan
     found = measured_pose(plant, robot)
     if found is not None:

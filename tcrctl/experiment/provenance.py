@@ -27,12 +27,20 @@ from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.robot.module import ring_rows
 
 _PACKAGES: Final = (
-    "foxglove-schemas-protobuf", "llvmlite", "mcap", "numba", "numpy", "protobuf", "pydantic", "pyyaml", "scipy",
-)  # fmt: skip
+    "foxglove-schemas-protobuf",
+    "llvmlite",
+    "mcap",
+    "numba",
+    "numpy",
+    "protobuf",
+    "pydantic",
+    "pyyaml",
+    "scipy",
+)
 
 
 def resolved_text(spec: ExperimentSpec) -> bytes:
-    """An experiment as a file with every default filled in and ``--set`` applied."""
+    """Write an experiment as a file with every default filled in and ``--set`` applied."""
     return strict_yaml.dumps(spec.model_dump(mode="json")).encode()
 
 
@@ -60,7 +68,7 @@ def own_files(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, bytes]:
 
 
 def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str, bytes]]:
-    """Media type and content of the files that a log carries, by name.
+    """Return the media type and content of the files that a log carries, by name.
 
     Args:
         loaded: The experiment as it was given.
@@ -81,7 +89,7 @@ def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str
 
 
 def _drawn(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str, bytes]]:
-    """What a simulated plant is, as far as the experiment only says how it is drawn."""
+    """Return what a simulated plant is, as far as the experiment only says how it is drawn."""
     files: dict[str, tuple[str, bytes]] = {}
     if not isinstance(spec.plant, SimulatedSettings):
         return files
@@ -101,7 +109,7 @@ def _drawn(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str, byt
 
 
 def versions() -> dict[str, str]:
-    """Versions of everything that the numbers of a run depend on, and a digest of this program's source."""
+    """Return versions of everything that the numbers of a run depend on, and a digest of this program's source."""
     import llvmlite.binding as llvm  # heavy
 
     cpu = llvm.get_host_cpu_name()  # type: ignore[no-untyped-call]  # decides what kernels are compiled to
@@ -123,7 +131,7 @@ def versions() -> dict[str, str]:
 
 
 def processor() -> str:
-    """Model name of the processor, or of its kind if the system does not say."""
+    """Return the model name of the processor, or of its kind if the system does not say."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
@@ -134,7 +142,7 @@ def processor() -> str:
 
 @cache
 def source_digest() -> str:
-    """SHA-256 over the names and contents of all Python files of the package."""
+    """Return the SHA-256 over the names and contents of all Python files of the package."""
     digest, package = hashlib.sha256(), Path(__file__).parents[1]
     for path in sorted(package.rglob("*.py")):
         digest.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
@@ -144,7 +152,7 @@ def source_digest() -> str:
 def start_metadata(
     run_id: str, loaded: LoadedSpec, spec: ExperimentSpec, *, realtime: bool
 ) -> Mapping[str, str]:
-    """Who, when and what, for the start record of a log."""
+    """Say who, when and what, for the start record of a log."""
     return {
         "run_id": run_id,
         "spec": spec.name,

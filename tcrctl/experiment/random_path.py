@@ -44,7 +44,9 @@ def random_path(loaded: LoadedSpec, seed: int) -> tuple[Experiment, int]:
     Raises:
         InputError: If the robot has not two segments of three cables each.
     """
-    random, robot, refused = np.random.default_rng(seed), build_robot(loaded.robot), 0
+    random = np.random.default_rng(seed)
+    robot = build_robot(loaded.robot)
+    refused = 0
     if robot.n_cables != 6:
         raise InputError(f"random paths need a robot with six cables; {robot.name} has {robot.n_cables}")
     while True:
@@ -64,7 +66,7 @@ def random_path(loaded: LoadedSpec, seed: int) -> tuple[Experiment, int]:
 
 
 def _path(random: np.random.Generator, robot: Robot) -> WaypointsSettings:
-    """Waypoints and limits of the motion."""
+    """Return the waypoints and limits of the motion."""
     return WaypointsSettings(
         kind="waypoints",
         points=tuple(_pose(random, robot) for _ in range(random.integers(2, 5))),
@@ -78,7 +80,7 @@ def _path(random: np.random.Generator, robot: Robot) -> WaypointsSettings:
 
 
 def _pose(random: np.random.Generator, robot: Robot) -> WaypointSettings:
-    """A pose that the nominal robot takes at rest with all cables taut."""
+    """Draw a pose that the nominal robot takes at rest with all cables taut."""
     while True:
         try:
             held = equilibrium(robot.model, _drives(random), robot.weight, robot.rest.q)
@@ -91,7 +93,7 @@ def _pose(random: np.random.Generator, robot: Robot) -> WaypointSettings:
 
 
 def _drives(random: np.random.Generator) -> Array:
-    """Drive lengths (6,) [m]: shortening, bending of the whole robot, bending of its upper segment."""
+    """Draw drive lengths (6,) [m]: shortening, bending of the whole robot, bending of its upper segment."""
     lower = np.arange(6) % 2 == 0
     short = random.uniform(0.0, 0.035)
     angles = np.radians(60.0 * np.arange(6))

@@ -29,7 +29,7 @@ from tcrctl.experiment.run_folder import (
     make_run_folder,
 )
 from tcrctl.experiment.summary import Summary
-from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.geometry import CableHoles, LogGeometry
 from tcrctl.log.mcap_file import Opening, Tap
 from tcrctl.log.writer import Flushing, LogWriter
 from tcrctl.loop.interruption import Interruption
@@ -38,7 +38,7 @@ from tcrctl.loop.pacing import Pace, RealTime, Unpaced
 from tcrctl.loop.quiet import quiet_interpreter
 from tcrctl.plant.plant import RunnablePlant
 from tcrctl.plant.rig.journal import Journal
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.robot.module import RIGID_BARS, module_of, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import StepRecord
@@ -101,7 +101,7 @@ def run_experiment(
 
         pace = RealTime(experiment.period, checked) if realtime else Unpaced(checked)
         journal = Journal(pace.time, notify)
-        plant, state = build_plant(experiment, Session(pace.time, journal.report, confirmed))
+        plant, state = build_plant(experiment, Operation(pace.time, journal.report, confirmed))
         try:
             parts, start_offset = build_parts(experiment, plant, state)
             folder = make_run_folder(out, experiment.spec.name)
@@ -150,7 +150,7 @@ def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeome
     model, routes = robot.model, []
     for c, name in enumerate(robot.cable_names):
         holes = slice(model.first_hole[c], model.first_hole[c + 1])
-        routes.append(CableRoute(name, model.hole_nodes[holes], model.hole_weights[holes]))
+        routes.append(CableHoles(name, model.hole_nodes[holes], model.hole_weights[holes]))
     duration = 0.0 if trajectory is None else trajectory.duration
     points = np.linspace(0.0, duration, min(MOST_PATH_POINTS, 2 + int(duration / PATH_SPACING_S)))
     return LogGeometry(
@@ -223,7 +223,7 @@ def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogW
 
 
 def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractContextManager[None]:
-    """A quiet interpreter for runs that the clock paces."""
+    """Keep the interpreter quiet in runs that the clock paces."""
     if not isinstance(pace, RealTime):
         return nullcontext()
     rig = experiment.loaded.rig
@@ -232,7 +232,7 @@ def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractCo
 
 
 def _start_message(offset: float, approach: float) -> tuple[str, str]:
-    """Level and text of what is known about the start: offset [m], and time [s] that the way there takes."""
+    """Return level and text of what is known about the start: offset [m], and time [s] that the way there takes."""
     if math.isnan(offset):
         return (
             "warning",

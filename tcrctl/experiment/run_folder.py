@@ -20,7 +20,7 @@ _TRIES: Final = 20
 
 
 def log_in(path: Path) -> Path:
-    """Path of a log that is given itself or by the folder of its run."""
+    """Return the path of a log that is given itself or by the folder of its run."""
     return path / LOG if path.is_dir() else path
 
 
@@ -83,7 +83,8 @@ class RunFolder:
 
 def link_latest(folder: Path) -> None:
     """Let ``latest`` beside a run's folder lead to it, where links can be made and nothing else has that name."""
-    link, beside = folder.with_name(LATEST), folder.with_name(f".{LATEST}.{os.getpid()}")
+    link = folder.with_name(LATEST)
+    beside = folder.with_name(f".{LATEST}.{os.getpid()}")
     if link.exists() and not link.is_symlink():
         return
     with suppress(OSError):

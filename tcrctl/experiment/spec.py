@@ -49,7 +49,7 @@ class LogSettings(Settings):
     )
 
     def full_state(self, period: float) -> float:
-        """Time between two steps that are logged in full at a control period [s]; 0: every step."""
+        """Return the time between two steps that are logged in full at a control period [s]; 0: every step."""
         if self.full_state_s != "auto":
             return self.full_state_s
         return 0.0 if period * _RICH_RATE_HZ > 1.0 - 1e-9 else 1.0

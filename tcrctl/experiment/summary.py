@@ -42,7 +42,7 @@ Numbers = dict[str, float] | None
 
 
 def unit_of(name: str) -> str:
-    """Unit of a value of the result by its dotted name; names of a task's values end in theirs."""
+    """Return the unit of a value of the result by its dotted name; names of a task's values end in theirs."""
     return UNITS.get(name) or (_SUFFIXES.get(name.rpartition("_")[2], "") if name.startswith(TASK) else "")
 
 
@@ -67,7 +67,7 @@ class Verdict:
     passed: bool
 
     def as_json(self) -> dict[str, Any]:
-        """The item of ``criteria`` in ``run --json``."""
+        """Return the item of ``criteria`` in ``run --json``."""
         return {name: getattr(self, name) for name in ("name", "limit", "value", "unit", "passed")}
 
     def __str__(self) -> str:
@@ -152,7 +152,7 @@ class Summary:
     versions: dict[str, str] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """The object of ``run --json``; numbers that are not finite become null; a latency is there on a rig."""
+        """Return the object of ``run --json``; numbers that are not finite become null; on a rig with latency."""
         measures = dataclasses.asdict(self.measures)
         if self.measures.latency_ms is None:
             del measures["latency_ms"]

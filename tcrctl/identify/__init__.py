@@ -1,6 +1,6 @@
 """Identification, [TCR] Sec. III.B: measured nodes -> robot parameters with error, spread and proof.
 
-    spec, data files -> load_identification -> build_problem -> swarm -> least squares
+    spec, data files -> load_identification -> build_regression -> swarm -> least squares
                                                                  -> identifiability, held-out error
                                                                  -> report, figure, robot file
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tcrctl.identify.frame import Frame
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.signals import Array
 
 
@@ -22,14 +22,14 @@ class Best:
 
     cost: float
     x: Array
-    frame: Frame
+    frame: CoordinateFrame
 
     @classmethod
-    def none(cls, x: Array, frame: Frame) -> Best:
-        """Where a method starts."""
+    def none(cls, x: Array, frame: CoordinateFrame) -> Best:
+        """Return where a method starts."""
         return cls(np.inf, x.copy(), frame)
 
-    def offer(self, cost: float, x: Array, frame: Frame) -> None:
+    def offer(self, cost: float, x: Array, frame: CoordinateFrame) -> None:
         """Take another answer if it is better."""
         if cost < self.cost:
             self.cost, self.x, self.frame = cost, np.array(x), frame

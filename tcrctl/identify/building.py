@@ -1,4 +1,4 @@
-"""From loaded files to the problem, held against common mistakes in the data."""
+"""From loaded files to the regression, held against common mistakes in the data."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 
 from tcrctl.elements import sliding_cable
 from tcrctl.errors import InputError
-from tcrctl.identify.frame import Frame
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.loading import LoadedIdentification
 from tcrctl.identify.log_data import Recording, read_recording
 from tcrctl.identify.parameters import start_of, with_values
-from tcrctl.identify.problem import Problem, distances
+from tcrctl.identify.regression import Regression, distances
 from tcrctl.robot.description import RobotDescription
 from tcrctl.robot.robot import build_robot
 from tcrctl.signals import Array
@@ -29,8 +29,8 @@ FORCES = ("_mpa", "_g", "_n")
 DAMPINGS = ("_n_s_m",)
 
 
-def build_problem(loaded: LoadedIdentification) -> tuple[Problem, str]:
-    """Build the problem; returns it and what stays when parameters change: ``tension`` or ``length``.
+def build_regression(loaded: LoadedIdentification) -> tuple[Regression, str]:
+    """Build the regression; returns it and what stays when parameters change: ``tension`` or ``length``.
 
     Raises:
         InputError: If the data do not fit the robot or each other, or are fewer than the unknowns.
@@ -49,14 +49,14 @@ def build_problem(loaded: LoadedIdentification) -> tuple[Problem, str]:
                     hint="Use strung_by: tension (--strung-by tension).",
                 )
     reference = spec.frame.reference if spec.frame.offset == "displacement" else ""
-    problem = Problem(
+    regression = Regression(
         robot, loaded.parameters, loaded.configurations, recordings, reference, spec.step_ms / 1e3
     )
-    return problem, strung_by
+    return regression, strung_by
 
 
 def _usual(loaded: LoadedIdentification, recordings: Sequence[Recording]) -> str:
-    """Simulated plants keep their rest lengths whatever their mismatch; else the robot file counts."""
+    """Return what stays: rest lengths with simulated plants, whatever their mismatch; else what the file gives."""
     only_logs = bool(recordings) and not loaded.configurations
     return "length" if only_logs and all(r.rest_length is not None for r in recordings) else "tension"
 
@@ -78,7 +78,7 @@ def _lengths(robot: RobotDescription, recordings: Sequence[Recording]) -> Array:
 
 
 def with_lengths(robot: RobotDescription, rest: Array) -> RobotDescription:
-    """The robot whose cables are given by rest lengths (m,) [m] instead of initial tensions."""
+    """Return the robot whose cables are given by rest lengths (m,) [m] instead of initial tensions."""
     changes: dict[str, float | None] = {TENSION: None}
     for c, length in enumerate(rest):
         changes[f"cables.routes.{c}.rest_length_mm"] = 1e3 * float(length)
@@ -86,48 +86,51 @@ def with_lengths(robot: RobotDescription, rest: Array) -> RobotDescription:
     return with_values(robot, changes)
 
 
-def choose_frame(loaded: LoadedIdentification, problem: Problem) -> tuple[Frame, Array, str]:
+def choose_frame(loaded: LoadedIdentification, regression: Regression) -> tuple[CoordinateFrame, Array, str]:
     """Find the frame that fits the robot as given, and see that the data can be meant.
 
     Returns:
-        Frame, prediction (n, 3) [m] of the robot as given, and a remark on the cables' order or nothing.
+        Coordinate frame, prediction (n, 3) [m] of the robot as given, and a remark on the cables' order or nothing.
 
     Raises:
         NoEquilibriumError: If the robot as given has no stable shape.
         InputError: If the sizes are off by a unit, or the data are fewer than the unknowns.
     """
-    predicted, measured = problem.predict(start_of(problem.parameters)), problem.measured
-    frame, remark = Frame.of(loaded.spec.frame).aligned(predicted, measured), ""
-    _check_size(problem, predicted)
-    _check_amount(problem, frame)
+    predicted = regression.predict(start_of(regression.parameters))
+    measured = regression.measured
+    known = CoordinateFrame.of(loaded.spec.frame)
+    frame = plain = known.aligned(predicted, measured)
+    remark = ""
+    _check_size(regression, predicted)
+    _check_amount(regression, frame)
     if loaded.spec.frame.mirrored == "try":
-        other = replace(Frame.of(loaded.spec.frame), mirrored=True).aligned(predicted, measured)
-        errors = [float(np.nanmean(distances(f, predicted, measured))) for f in (frame, other)]
-        frame = frame if errors[0] <= errors[1] else other
+        mirrored = replace(known, mirrored=True).aligned(predicted, measured)
+        errors = [float(np.nanmean(distances(f, predicted, measured))) for f in (plain, mirrored)]
+        frame = plain if errors[0] <= errors[1] else mirrored
         if abs(errors[0] - errors[1]) < 0.01 * max(errors):
             remark = "the data cannot tell whether the cables' order is mirrored; taken as not mirrored"
-            frame = frame if not frame.mirrored else Frame.of(loaded.spec.frame).aligned(predicted, measured)
+            frame = plain
     return frame, predicted, remark
 
 
-def _check_amount(problem: Problem, frame: Frame) -> None:
-    coordinates = int((~np.isnan(problem.measured)).sum())
-    unknowns = len(problem.parameters) + len(frame.unknowns)
+def _check_amount(regression: Regression, frame: CoordinateFrame) -> None:
+    coordinates = int((~np.isnan(regression.measured)).sum())
+    unknowns = len(regression.parameters) + len(frame.unknowns)
     if coordinates < unknowns:
         raise InputError(
             f"{coordinates} measured coordinates are too few for {unknowns} unknowns "
-            f"({len(problem.parameters)} parameters, {len(frame.unknowns)} of the frame)",
+            f"({len(regression.parameters)} parameters, {len(frame.unknowns)} of the frame)",
             hint="Measure more configurations or points, or identify fewer parameters.",
         )
 
 
-def _check_size(problem: Problem, predicted: Array) -> None:
+def _check_size(regression: Regression, predicted: Array) -> None:
     """Compare how far measured and modelled points lie apart; a wrong unit shows whatever the frame."""
-    whole = ~np.isnan(problem.measured).any(axis=1)
+    whole = ~np.isnan(regression.measured).any(axis=1)
     if whole.sum() < 2:
         return
-    measured, modelled = problem.measured[whole], predicted[whole]
-    if problem.reference:
+    measured, modelled = regression.measured[whole], predicted[whole]
+    if regression.reference:
         sizes = [float(np.sqrt((points**2).sum(axis=1).mean())) for points in (measured, modelled)]
     else:
         sizes = [float(np.sqrt(points.var(axis=0).sum())) for points in (measured, modelled)]
@@ -140,7 +143,7 @@ def _check_size(problem: Problem, predicted: Array) -> None:
 
 
 def assumed_forces(robot: RobotDescription, free: Sequence[str], *, moving: bool) -> dict[str, float]:
-    """Values that fix the scale of forces without having been measured, by path.
+    """Return the values that fix the scale of forces without having been measured, by path.
 
     Moduli, masses, tensions and dampings times one factor move nothing. A weighed module fixes that factor; the
     initial tension is assumed even then. If the module's mass is to be found too, everything else is assumed.
@@ -159,7 +162,7 @@ def assumed_forces(robot: RobotDescription, free: Sequence[str], *, moving: bool
 
 
 def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
-    """Every number of a robot as plain data, by dotted path."""
+    """Return every number of a robot as plain data, by dotted path."""
     if isinstance(data, dict | list):
         for key, value in data.items() if isinstance(data, dict) else enumerate(data):
             yield from _numbers(value, f"{path}.{key}" if path else str(key))

@@ -126,13 +126,13 @@ def _tolerance(parameter: Parameter, value: float, tolerance: float) -> float:
 
 
 def _square(tall: Array) -> Array:
-    """A matrix with the columns' inner products of ``tall`` (r, n), but at least and hardly more than n rows."""
+    """Return a matrix with the columns' inner products of ``tall`` (r, n), but only n rows or a few more."""
     r: Array = np.asarray(np.linalg.qr(tall, mode="r"))
     return np.vstack([r, np.zeros((tall.shape[1] - len(r), tall.shape[1]))])
 
 
 def _inverse(scaled: Array) -> Array:
-    """(S'S)^-1, infinite for parameters with a part in a direction that S does not see."""
+    """Return (S'S)^-1, infinite for parameters with a part in a direction that S does not see."""
     _, s, vt = np.linalg.svd(scaled, full_matrices=False)
     blind = s <= ROUNDING * max(float(s[0]), 1.0)
     inverse: Array = (vt[~blind].T / s[~blind] ** 2) @ vt[~blind]
@@ -151,7 +151,7 @@ def _combinations(
 def _combination(
     parameters: Sequence[Parameter], value: Array, unit: Array, v: Array, s: float, assumed: str = ""
 ) -> Combination:
-    """Direction ``v`` in tolerances as relative changes, the largest member 1."""
+    """Return the direction ``v`` in tolerances as relative changes, the largest member 1."""
     change = v * unit / np.where(value != 0.0, np.abs(value), 1.0)
     largest = change[int(np.argmax(np.abs(change)))]
     weights = {
@@ -171,7 +171,7 @@ def _resting(
     assumed: str,
     prior: float,
 ) -> list[Combination]:
-    """Combinations, of those that are certain, which are so only because of the assumed value.
+    """Return those certain combinations which are so only because of the assumed value.
 
     The last column of ``wide`` is that of the assumed value; ``prior`` is its tolerance over its spread.
     """

@@ -15,23 +15,23 @@ from tcrctl.errors import DivergenceError, NoEquilibriumError, TcrctlError
 from tcrctl.executors.carried import Carried, carried
 from tcrctl.executors.engine import Engine
 from tcrctl.executors.workers import Workers
-from tcrctl.identify.problem import Problem
+from tcrctl.identify.regression import Regression
 from tcrctl.signals import Array
 
 #: How often a wait looks for signals [s].
 _LOOK_S: Final = 0.1
 
 
-def prediction(problem: Problem, x: Array) -> Array | None:
+def prediction(regression: Regression, x: Array) -> Array | None:
     """Return the prediction (n, 3) [m] at ``x`` of the unit cube, None if the robot has no shape there."""
     try:
-        return problem.predict(x)
+        return regression.predict(x)
     except (NoEquilibriumError, DivergenceError):
         return None
 
 
-def _prediction_at(problem: Carried[Problem], x: Array) -> Array | None:
-    return prediction(problem.value, x)
+def _prediction_at(regression: Carried[Regression], x: Array) -> Array | None:
+    return prediction(regression.value, x)
 
 
 @dataclass
@@ -39,38 +39,36 @@ class Evaluator:
     """Runs predictions here or on an executor, whose workers are started when first needed.
 
     Attributes:
-        problem: What is evaluated.
+        regression: What is evaluated.
         engine: Where predictions are made; with one job in this process.
         check: Raises if a signal has come.
         progress: Told the number of evaluations so far.
         evaluations: Predictions of the whole data so far; sensitivities of statics count as one.
     """
 
-    problem: Problem
+    regression: Regression
     engine: Engine
     check: Callable[[], None]
     progress: Callable[[int], None] = lambda evaluations: None
     evaluations: int = 0
     _opened: ExitStack = field(default_factory=ExitStack, repr=False)
     _workers: Workers | None = field(default=None, repr=False)
-    _parcel: Carried[Problem] | None = field(default=None, repr=False)
+    _parcel: Carried[Regression] | None = field(default=None, repr=False)
 
     def predict(self, x: Array) -> Array | None:
-        """Prediction (n, 3) [m] at ``x`` of the unit cube, None if the robot has no shape there."""
+        """Return the prediction (n, 3) [m] at ``x`` of the unit cube, None if the robot has no shape there."""
         self.check()
-        found = prediction(self.problem, x)
+        found = prediction(self.regression, x)
         self.count(1)
         return found
 
     def predict_many(self, points: Sequence[Array]) -> list[Array | None]:
-        """Predictions at several points, side by side."""
+        """Return the predictions at several points, side by side."""
         if self.engine == Engine(jobs=1) or len(points) == 1:
             return [self.predict(x) for x in points]
         if self._workers is None or self._parcel is None:
-            self._workers, self._parcel = (
-                self._opened.enter_context(self.engine.open()),
-                carried(self.problem),
-            )
+            self._workers = self._opened.enter_context(self.engine.open())
+            self._parcel = carried(self.regression)
         submit = self._workers.executor.submit
         try:
             asked = [submit(_prediction_at, self._parcel, x) for x in points]
@@ -90,7 +88,7 @@ class Evaluator:
             self.check()
 
     def slopes(self, x: Array, predicted: Array) -> Array:
-        """∂(prediction)/∂x (n, 3, n_parameters): analytic for statics, differences for logs.
+        """Return ∂(prediction)/∂x (n, 3, n_parameters): analytic for statics, differences for logs.
 
         Args:
             x: Place in the unit cube.
@@ -100,16 +98,16 @@ class Evaluator:
             NoEquilibriumError: If the robot has no shape there.
         """
         self.check()
-        if not self.problem.recordings:
-            found = self.problem.static_slopes(x)
+        if not self.regression.recordings:
+            found = self.regression.static_slopes(x)
             self.count(1)
             return found
-        beside = self.problem.difference_points(x)
+        beside = self.regression.difference_points(x)
         columns = []
-        for (_, step), there in zip(beside, self.predict_many([p for p, _ in beside]), strict=True):
+        for (_, deviation), there in zip(beside, self.predict_many([p for p, _ in beside]), strict=True):
             if there is None:
                 raise NoEquilibriumError("a sensitivity", np.nan, 0.0, 0)
-            columns.append((there - predicted) / step)
+            columns.append((there - predicted) / deviation)
         return np.stack(columns, axis=2)
 
     def count(self, number: int) -> None:
@@ -118,7 +116,7 @@ class Evaluator:
         self.progress(self.evaluations)
 
     def __enter__(self) -> Self:
-        """Nothing is started yet."""
+        """Return itself: nothing is started yet."""
         return self
 
     def __exit__(

@@ -57,7 +57,7 @@ def _draw_errors(axes: Axes, result: Result) -> None:
 
 
 def _draw_parameters(axes: Axes, result: Result) -> None:
-    """Values with two standard deviations, as places within their bounds."""
+    """Draw values with two standard deviations, as places within their bounds."""
     for row, (p, value) in enumerate(zip(result.parameters, result.values, strict=True)):
         place = p.unit(float(value))
         axes.plot([0.0, 1.0], [row, row], color=_BEFORE, linewidth=1.0)

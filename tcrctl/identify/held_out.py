@@ -14,12 +14,12 @@ from tcrctl.errors import NoEquilibriumError
 from tcrctl.identify.best import Best
 from tcrctl.identify.evaluation import Evaluator
 from tcrctl.identify.polish import Residuals, polish
-from tcrctl.identify.problem import distances
+from tcrctl.identify.regression import distances
 from tcrctl.signals import Array
 
 
 def held_out_errors(evaluator: Evaluator, residuals: Residuals, answer: Array) -> Array:
-    """Mean error of every group (n_groups,) [mm] after an identification without it.
+    """Return the mean error of every group (n_groups,) [mm] after an identification without it.
 
     NaN where the other groups have fewer coordinates than there are unknowns, or where no answer was found.
 
@@ -28,25 +28,25 @@ def held_out_errors(evaluator: Evaluator, residuals: Residuals, answer: Array) -
         residuals: Those of all groups.
         answer: Parameters and frame unknowns found from all groups.
     """
-    problem, used = evaluator.problem, residuals.used
-    number = range(len(problem.group_names))
-    rest = [used & (problem.group != group)[:, None] for group in number]
+    regression, used = evaluator.regression, residuals.used
+    number = range(len(regression.group_names))
+    rest = [used & (regression.group != group)[:, None] for group in number]
     known = [group for group in number if rest[group].sum() >= len(answer)]
-    if problem.recordings:
+    if regression.recordings:
         without = _stepped(residuals, answer, [rest[group] for group in known])
     else:
         without = [_refitted(evaluator, residuals, answer, rest[group]) for group in known]
-    errors = np.full(len(problem.group_names), np.nan)
+    errors = np.full(len(regression.group_names), np.nan)
     predictions = evaluator.predict_many([residuals.split(z)[0] for z in without])
     for group, z, predicted in zip(known, without, predictions, strict=True):
         if predicted is not None:
-            held = (problem.group == group) & used.any(axis=1)
-            errors[group] = distances(residuals.split(z)[1], predicted, problem.measured)[held].mean()
+            held = (regression.group == group) & used.any(axis=1)
+            errors[group] = distances(residuals.split(z)[1], predicted, regression.measured)[held].mean()
     return errors
 
 
 def _refitted(evaluator: Evaluator, residuals: Residuals, answer: Array, rest: NDArray[np.bool_]) -> Array:
-    """The answer from the coordinates ``rest`` (n, 3) alone; NaN if there is none."""
+    """Return the answer from the coordinates ``rest`` (n, 3) alone; NaN if there is none."""
     best = Best.none(*residuals.split(answer))
     try:
         polish(evaluator, rest, best)
@@ -56,9 +56,9 @@ def _refitted(evaluator: Evaluator, residuals: Residuals, answer: Array, rest: N
 
 
 def _stepped(residuals: Residuals, answer: Array, rests: list[NDArray[np.bool_]]) -> list[Array]:
-    """Answers from the coordinates of each of ``rests`` alone, to first order, within the bounds."""
+    """Return the answers from the coordinates of each of ``rests`` alone, to first order, within the bounds."""
     jacobian, value = residuals.jacobian(answer), residuals.value(answer)
-    n, found = len(residuals.evaluator.problem.parameters), []
+    n, found = len(residuals.evaluator.regression.parameters), []
     for rest in rests:
         kept = rest[residuals.used]
         z = answer - np.linalg.lstsq(jacobian[kept], value[kept], rcond=None)[0]

@@ -1,4 +1,4 @@
-"""The identification itself: problem -> swarm -> least squares -> certainty, held-out errors -> result."""
+"""The identification itself: regression -> swarm -> least squares -> certainty, held-out errors -> result."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from tcrctl.errors import RunInterruptedError
 from tcrctl.executors.engine import Engine, physical_cores
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.identify.best import Best
-from tcrctl.identify.building import assumed_forces, build_problem, choose_frame
+from tcrctl.identify.building import assumed_forces, build_regression, choose_frame
 from tcrctl.identify.certainty import Certainty, certainty
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.evaluation import Evaluator
-from tcrctl.identify.frame import Frame
 from tcrctl.identify.held_out import held_out_errors
 from tcrctl.identify.loading import LoadedIdentification
 from tcrctl.identify.parameters import start_of, values, with_values
 from tcrctl.identify.polish import Residuals, polish
-from tcrctl.identify.problem import MM, Problem, distances
+from tcrctl.identify.regression import MM, Regression, distances
 from tcrctl.identify.result import Group, Result, Stage
 from tcrctl.identify.swarm import search
 from tcrctl.loop.interruption import Interruption
@@ -37,7 +37,7 @@ Progress = Callable[[str, int, float], None]
 
 
 def silent(text: str) -> None:
-    """Take a message for the user and drop it."""
+    """Discard a message for the user."""
 
 
 def no_progress(what: str, evaluations: int, best_mm: float) -> None:
@@ -50,9 +50,9 @@ class Work:
 
     Attributes:
         loaded: What is to be done.
-        problem: Data and model.
+        regression: Data and model.
         start: Prediction of the robot as given (n, 3) [m].
-        frame: Frame that fits it.
+        frame: Coordinate frame that fits it.
         evaluator: Evaluates the model.
         best: Best answer so far.
         stages: Methods done.
@@ -60,9 +60,9 @@ class Work:
     """
 
     loaded: LoadedIdentification
-    problem: Problem
+    regression: Regression
     start: Array
-    frame: Frame
+    frame: CoordinateFrame
     evaluator: Evaluator
     best: Best
     stages: list[Stage] = field(default_factory=list)
@@ -71,11 +71,11 @@ class Work:
     @property
     def used(self) -> NDArray[np.bool_]:
         """Which coordinates are measured (n, 3)."""
-        return ~np.isnan(self.problem.measured)
+        return ~np.isnan(self.regression.measured)
 
-    def errors(self, frame: Frame, predicted: Array) -> Array:
-        """Distances of all measured points [mm]."""
-        return distances(frame, predicted, self.problem.measured)[self.used.any(axis=1)]
+    def errors(self, frame: CoordinateFrame, predicted: Array) -> Array:
+        """Return the distances of all measured points [mm]."""
+        return distances(frame, predicted, self.regression.measured)[self.used.any(axis=1)]
 
 
 def identify(
@@ -102,14 +102,16 @@ def identify(
     """
     begin = time.perf_counter()
     with announced_compilation(notify):
-        problem, strung_by = build_problem(loaded)
-        frame, predicted, remark = choose_frame(loaded, problem)
-    best = Best.none(start_of(problem.parameters), frame)
+        regression, strung_by = build_regression(loaded)
+        frame, predicted, remark = choose_frame(loaded, regression)
+    best = Best.none(start_of(regression.parameters), frame)
     interruption = Interruption()
-    evaluator = Evaluator(problem, engine or Engine(physical_cores()), interruption.check)
-    work = Work(loaded, problem, predicted, frame, evaluator, best)
+    evaluator = Evaluator(regression, engine or Engine(physical_cores()), interruption.check)
+    work = Work(loaded, regression, predicted, frame, evaluator, best)
     evaluator.progress = lambda count: progress(work.doing, count, _shown(work))
-    held_out, judged, failure = np.full(len(problem.group_names), np.nan), None, None
+    held_out = np.full(len(regression.group_names), np.nan)
+    judged = None
+    failure = None
     with interruption, evaluator:
         try:
             _search(work)
@@ -126,7 +128,7 @@ def identify(
 
 
 def _search(work: Work) -> None:
-    """All methods one after the other, each from the answer of the one before."""
+    """Run all methods one after the other, each from the answer of the one before."""
     spec = work.loaded.spec
     for method in spec.method.split("+"):
         work.doing = method
@@ -140,14 +142,14 @@ def _search(work: Work) -> None:
 
 
 def _stage(work: Work, method: str, evaluations: int, seconds: float) -> Stage:
-    predicted = work.problem.predict(work.best.x)
+    predicted = work.regression.predict(work.best.x)
     error = float(work.errors(work.best.frame, predicted).mean())
-    found = values(work.problem.parameters, work.best.x)
+    found = values(work.regression.parameters, work.best.x)
     return Stage(method, found, error, evaluations, seconds)
 
 
 def _shown(work: Work) -> float:
-    """Mean error of the best answer so far [mm], for the progress display; in least squares an rms."""
+    """Return the mean error of the best answer so far [mm], for the progress display; in least squares an rms."""
     if work.doing == "pso":
         return work.best.cost
     count = max(1, int(work.used.any(axis=1).sum()))
@@ -155,14 +157,16 @@ def _shown(work: Work) -> float:
 
 
 def _judge(work: Work, residuals: Residuals, answer: Array) -> Certainty:
-    """Sensitivities at the answer, in the parameters' own units, and what they mean."""
-    problem, best, spec = work.problem, work.best, work.loaded.spec
+    """Return the sensitivities at the answer, in the parameters' own units, and what they mean."""
+    regression = work.regression
+    best = work.best
+    spec = work.loaded.spec
     residual, jacobian = residuals.value(answer), residuals.jacobian(answer)
     n = len(best.x)
-    value = np.array(list(values(problem.parameters, best.x).values()))
-    slope = np.array([p.slope(float(u)) for p, u in zip(problem.parameters, best.x, strict=True)])
+    value = np.array(list(values(regression.parameters, best.x).values()))
+    slope = np.array([p.slope(float(u)) for p, u in zip(regression.parameters, best.x, strict=True)])
     return certainty(
-        problem.parameters,
+        regression.parameters,
         value,
         jacobian[:, :n] / slope,
         jacobian[:, n:],
@@ -174,18 +178,18 @@ def _judge(work: Work, residuals: Residuals, answer: Array) -> Certainty:
 
 
 def _assumed(work: Work) -> tuple[str, Array] | None:
-    """Derivative with respect to the scale of the forces that are assumed to be known; None without them."""
-    problem, best = work.problem, work.best
-    free = [p.path for p in problem.parameters]
-    forces = assumed_forces(problem.robot, free, moving=bool(problem.recordings))
+    """Return the derivative by the scale of the forces that are assumed to be known; None without them."""
+    regression, best = work.regression, work.best
+    free = [p.path for p in regression.parameters]
+    forces = assumed_forces(regression.robot, free, moving=bool(regression.recordings))
     if not forces:
         return None
     ends = []
     for factor in (1.0 - FORCE_STEP, 1.0 + FORCE_STEP):
-        changed = with_values(problem.robot, {path: factor * value for path, value in forces.items()})
-        predicted = Evaluator(replace(problem, robot=changed), Engine(jobs=1), work.evaluator.check).predict(
-            best.x
-        )
+        changed = with_values(regression.robot, {path: factor * value for path, value in forces.items()})
+        predicted = Evaluator(
+            replace(regression, robot=changed), Engine(jobs=1), work.evaluator.check
+        ).predict(best.x)
         work.evaluator.count(1)
         if predicted is None:
             return None
@@ -195,7 +199,7 @@ def _assumed(work: Work) -> tuple[str, Array] | None:
 
 def _at_bounds(work: Work) -> list[str]:
     said = []
-    for p, u in zip(work.problem.parameters, work.best.x, strict=True):
+    for p, u in zip(work.regression.parameters, work.best.x, strict=True):
         if min(u, 1.0 - u) < AT_BOUND:
             bound, which = (p.low, "lower") if u < 0.5 else (p.high, "upper")
             said.append(f"{p.path} stands at its {which} bound, {bound:g}: the true value may lie beyond")
@@ -211,21 +215,23 @@ def _result(
     remarks: tuple[str, ...],
     seconds: float,
 ) -> Result:
-    problem, best, spec = work.problem, work.best, work.loaded.spec
-    predicted = problem.predict(best.x)
+    regression = work.regression
+    best = work.best
+    spec = work.loaded.spec
+    predicted = regression.predict(best.x)
     errors = [
-        distances(f, p, problem.measured) for f, p in ((work.frame, work.start), (best.frame, predicted))
+        distances(f, p, regression.measured) for f, p in ((work.frame, work.start), (best.frame, predicted))
     ]
     seen = work.used.any(axis=1)
     groups = []
-    for i, name in enumerate(problem.group_names):
-        members = seen & (problem.group == i)
+    for i, name in enumerate(regression.group_names):
+        members = seen & (regression.group == i)
         before, after = (float(e[members].mean()) if members.any() else np.nan for e in errors)
         groups.append(Group(name, before, after, float(held_out[i])))
     return Result(
         spec=spec.name,
         robot=work.loaded.robot.name,
-        base=problem.robot,
+        base=regression.robot,
         new_robot=f"{work.loaded.robot.name}_identified",
         status="success" if failure is None else "aborted",
         reason="" if failure is None else str(failure),
@@ -233,8 +239,8 @@ def _result(
         method=spec.method,
         seed=spec.seed,
         strung_by=strung_by,
-        parameters=problem.parameters,
-        values=np.array(list(values(problem.parameters, best.x).values())),
+        parameters=regression.parameters,
+        values=np.array(list(values(regression.parameters, best.x).values())),
         frame=best.frame,
         certainty=judged,
         groups=tuple(groups),

@@ -16,24 +16,24 @@ from tcrctl.signals import Array
 SPECTRAL_RADIUS = 0.8
 
 
-def marker_motion(robot: Robot, recording: Recording, step: float) -> Array:
-    """Marker positions at the recording's frames (f, k, 3) [m].
+def marker_motion(robot: Robot, recording: Recording, h: float) -> Array:
+    """Return the marker positions at the recording's frames (f, k, 3) [m].
 
     Args:
         robot: The robot; it starts at rest with the first drive lengths.
         recording: How the drives moved, and when the cameras looked.
-        step: Largest internal time step [s].
+        h: Largest internal step [s].
 
     Raises:
         NoEquilibriumError: If it has no shape at rest there.
-        DivergenceError: If a time step did not converge.
+        DivergenceError: If an internal step did not converge.
     """
     first = recording.drive[0]
     start = equilibrium(robot.model, first, robot.weight, robot.rest.q)
     state = dynamics.rest_state(start.q, first)
     work, scratch = make_workspace(robot.model), dynamics.make_scratch(robot.model)
     work.tension[:] = start.tension
-    n, rule = len(recording.time), dynamics.Rule(step, SPECTRAL_RADIUS)
+    n, rule = len(recording.time), dynamics.Rule(h, SPECTRAL_RADIUS)
     q, v = np.empty((n, state.q.size)), np.empty((n, state.q.size))
     q[0], v[0] = state.q, state.v
     for k in range(1, n):
@@ -52,7 +52,7 @@ def marker_motion(robot: Robot, recording: Recording, step: float) -> Array:
 
 
 def _between(time: Array, q: Array, v: Array, at: Array) -> Array:
-    """Cubic Hermite interpolation of q (n, c) with slopes v at instants ``at`` (f,) within ``time`` (n,)."""
+    """Return cubic Hermite interpolation of q (n, c) with slopes v at instants ``at`` (f,) within ``time`` (n,)."""
     k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     width = (time[k + 1] - time[k])[:, None]
     s = ((at - time[k])[:, None]) / width

@@ -38,7 +38,7 @@ class Parameter:
     log: bool
 
     def value(self, x: float) -> float:
-        """Value at ``x`` of the unit interval."""
+        """Return the value at ``x`` of the unit interval."""
         if self.log:
             return float(self.low * (self.high / self.low) ** x)
         return float(self.low + (self.high - self.low) * x)
@@ -50,29 +50,29 @@ class Parameter:
         return (value - self.low) / (self.high - self.low)
 
     def slope(self, x: float) -> float:
-        """Derivative of the value with respect to ``x``."""
+        """Return the derivative of the value with respect to ``x``."""
         if self.log:
             return self.value(x) * math.log(self.high / self.low)
         return self.high - self.low
 
 
 def values(parameters: Sequence[Parameter], x: Array) -> dict[str, float]:
-    """Values by path at ``x`` (n,) of the unit cube."""
+    """Return the values by path at ``x`` (n,) of the unit cube."""
     return {p.path: p.value(float(u)) for p, u in zip(parameters, x, strict=True)}
 
 
 def start_of(parameters: Sequence[Parameter]) -> Array:
-    """The robot as given (n,), in the unit cube."""
+    """Return the robot as given (n,), in the unit cube."""
     return np.array([p.unit(p.start) for p in parameters])
 
 
 def split(path: str) -> Keys:
-    """Keys of a dotted path; numbers are list indices."""
+    """Return the keys of a dotted path; numbers are list indices."""
     return tuple(int(key) if key.isdecimal() else key for key in path.split("."))
 
 
 def look_up(data: Any, path: str) -> float:
-    """Number at a dotted path of a robot as plain data.
+    """Return the number at a dotted path of a robot as plain data.
 
     Raises:
         ValueError: If there is none; the message says what there is instead.
@@ -101,7 +101,7 @@ def _step(value: Any, key: str | int, done: str) -> Any:
 
 
 def with_values(robot: RobotDescription, changes: Mapping[str, Any]) -> RobotDescription:
-    """The robot with other values at dotted paths.
+    """Return the robot with other values at dotted paths.
 
     Args:
         robot: What to start from.

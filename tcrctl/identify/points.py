@@ -12,7 +12,7 @@ _RING = re.compile(r"ring([1-9][0-9]*)")
 
 
 def node_rows(name: str, robot: RobotDescription) -> tuple[int, int, int]:
-    """Rows of the three nodes whose mean is the point; a single node stands there three times.
+    """Return the rows of the three nodes whose mean is the point; a single node stands there three times.
 
     Args:
         name: Name of the point.

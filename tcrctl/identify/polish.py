@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from tcrctl.errors import NoEquilibriumError
 from tcrctl.identify.best import Best
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.evaluation import Evaluator
-from tcrctl.identify.frame import Frame
-from tcrctl.identify.problem import MM
+from tcrctl.identify.regression import MM
 from tcrctl.signals import Array
 
 #: Residual of every coordinate where the robot has no stable shape [mm]; the step is then refused.
@@ -35,25 +35,25 @@ class Residuals:
     """
 
     evaluator: Evaluator
-    frame: Frame
+    frame: CoordinateFrame
     used: NDArray[np.bool_]
     best: Best
     _predicted: tuple[Array, Array | None] | None = None
     _jacobian: tuple[Array, Array] | None = None
 
     def value(self, z: Array) -> Array:
-        """Differences [mm] at parameters and frame unknowns z = (x, frame)."""
+        """Return the differences [mm] at parameters and frame unknowns z = (x, frame)."""
         x, frame = self.split(z)
         predicted = self._prediction(x)
         if predicted is None:
             return np.full(int(self.used.sum()), NO_SHAPE)
-        difference = MM * (frame.place(predicted) - self.evaluator.problem.measured)[self.used]
+        difference = MM * (frame.place(predicted) - self.evaluator.regression.measured)[self.used]
         self.best.offer(float(difference @ difference), x, frame)
         out: Array = difference
         return out
 
     def jacobian(self, z: Array) -> Array:
-        """Derivative of :meth:`value` [mm], (coordinates, unknowns).
+        """Return the derivative of :meth:`value` [mm], (coordinates, unknowns).
 
         Raises:
             NoEquilibriumError: If the robot has no stable shape there.
@@ -70,9 +70,9 @@ class Residuals:
         self._jacobian = z.copy(), found
         return found
 
-    def split(self, z: Array) -> tuple[Array, Frame]:
-        """Parameters and frame of the unknowns."""
-        n = len(self.evaluator.problem.parameters)
+    def split(self, z: Array) -> tuple[Array, CoordinateFrame]:
+        """Return the parameters and frame of the unknowns."""
+        n = len(self.evaluator.regression.parameters)
         return z[:n], self.frame.with_unknowns(z[n:])
 
     def _prediction(self, x: Array) -> Array | None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tcrctl.identify.certainty import Certainty
-from tcrctl.identify.frame import Frame
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.parameters import Parameter
 from tcrctl.robot.description import RobotDescription
 from tcrctl.signals import Array
@@ -86,7 +86,7 @@ class Result:
     strung_by: str
     parameters: tuple[Parameter, ...]
     values: Array
-    frame: Frame
+    frame: CoordinateFrame
     certainty: Certainty | None
     groups: tuple[Group, ...]
     mean_error_before_mm: float
@@ -109,7 +109,7 @@ class Result:
         return (*map(str, combinations), *self.remarks)
 
     def as_json(self, robot_file: Path | None = None, figure: Path | None = None) -> dict[str, Any]:
-        """One object for ``identify --json``; what is not known is null.
+        """Return one object for ``identify --json``; what is not known is null.
 
         Args:
             robot_file: Where the new robot was written.

@@ -18,7 +18,7 @@ from tcrctl.robot.description import RobotDescription
 
 
 def robot_text(given: str, result: Result) -> str:
-    """Text of the new robot file.
+    """Return text of the new robot file.
 
     Args:
         given: Text of the robot file that was started from.

@@ -54,27 +54,27 @@ class Twins(NamedTuple):
     Attributes:
         below: The parameter is a little smaller.
         above: It is a little larger.
-        step: Distance between the two, in the parameter's unit.
+        apart: Distance between the two, in the parameter's unit.
     """
 
     below: Side
     above: Side
-    step: float
+    apart: float
 
     def force_slope(self, q: Array, drive: Array) -> Array:
-        """∂r/∂ζ (12 n_modules,) at the shape ``q`` (3 n_nodes,) and ``drive`` (m,)."""
+        """Return ∂r/∂ζ (n_free,) at the shape ``q`` (3 n_nodes,) and ``drive`` (m,)."""
         low, high = (_at(side, q, drive).r for side in (self.below, self.above))
-        slope: Array = (high - low) / self.step
+        slope: Array = (high - low) / self.apart
         return slope
 
     @property
     def base_slope(self) -> Array:
         """How the base moves (12,)."""
-        return (self.above.base - self.below.base) / self.step
+        return (self.above.base - self.below.base) / self.apart
 
 
 def rest_shapes(robot: Robot, drives: Array) -> Array:
-    """Node positions at rest (n, 3 n_nodes) [m] for drives (n, m) [m], each on its own way from the rest shape.
+    """Find node positions at rest (n, 3 n_nodes) [m] for drives (n, m) [m], each straight from the rest shape.
 
     Raises:
         NoEquilibriumError: If the robot has no stable shape there.
@@ -83,7 +83,7 @@ def rest_shapes(robot: Robot, drives: Array) -> Array:
 
 
 def shape_slopes(robot: Robot, twins: Sequence[Twins], q: Array, drive: Array) -> Array:
-    """dq/dζ (3 n_nodes, n_parameters) of the equilibrium ``q`` (3 n_nodes,) at ``drive`` (m,).
+    """Return dq/dζ (3 n_nodes, n_parameters) of the equilibrium ``q`` (3 n_nodes,) at ``drive`` (m,).
 
     Raises:
         NoEquilibriumError: If the tangent at ``q`` is not positive definite.
@@ -92,7 +92,7 @@ def shape_slopes(robot: Robot, twins: Sequence[Twins], q: Array, drive: Array) -
 
 
 def make_twins(describe: Describe, robot: Robot, values: Mapping[str, float]) -> tuple[Twins, ...]:
-    """Neighbours of a robot for every parameter.
+    """Return the neighbours of a robot for every parameter.
 
     Args:
         describe: Values by path -> description.
@@ -111,7 +111,7 @@ def make_twins(describe: Describe, robot: Robot, values: Mapping[str, float]) ->
 
 
 def _twins(robot: Robot, below: RobotDescription, above: RobotDescription, half: float) -> Twins:
-    """Neighbours with the rest lengths that they would be given, to first order."""
+    """Return the neighbours with the rest lengths that they would be given, to first order."""
     if any(route.initial_tension is None for route in cable_routes(below)):
         rest = robot.model.cables[:, sliding_cable.REST]
         return Twins(_side(below, rest), _side(above, rest), 2.0 * half)
@@ -146,14 +146,14 @@ def _lengths_under_tension(d: RobotDescription, q: Array) -> Array:
 
 
 def _at(side: Side, q: Array, drive: Array) -> Workspace:
-    """Residual, cable gradients and lengths with the free nodes as in ``q``."""
+    """Return the residual, cable gradients and lengths with the free nodes as in ``q``."""
     ws = make_workspace(side.model)
     residual(side.model, np.concatenate([side.base, _free(q)]), drive, side.load, ws)
     return ws
 
 
 def _moved(robot: Robot, twins: Sequence[Twins], q: Array, drive: Array, *, keep_cables: bool) -> Array:
-    """dq/dζ (3 n_nodes, n): A^-1 applied to -∂r/∂ζ.
+    """Return dq/dζ (3 n_nodes, n): A^-1 applied to -∂r/∂ζ.
 
     Args:
         robot: The robot in equilibrium.
@@ -175,5 +175,5 @@ def _moved(robot: Robot, twins: Sequence[Twins], q: Array, drive: Array, *, keep
 
 
 def _free(q: Array) -> Array:
-    """The part of ``q`` (3 n_nodes,) that belongs to the free nodes."""
+    """Return the part of ``q`` (3 n_nodes,) that belongs to the free nodes."""
     return q[3 * FIXED :]

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from tcrctl.identify.best import Best
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.evaluation import Evaluator
-from tcrctl.identify.frame import Frame
-from tcrctl.identify.problem import mean_distance
+from tcrctl.identify.regression import mean_distance
 from tcrctl.identify.settings import SwarmSettings
 from tcrctl.signals import Array
 
@@ -28,7 +28,7 @@ REBOUND: Final = 0.5
 
 
 def search(
-    evaluator: Evaluator, frame: Frame, start: Array, settings: SwarmSettings, seed: int, best: Best
+    evaluator: Evaluator, frame: CoordinateFrame, start: Array, settings: SwarmSettings, seed: int, best: Best
 ) -> None:
     """Let a swarm look for the minimum of (10); the robot as given is one of the first particles.
 
@@ -63,14 +63,14 @@ def search(
 
 
 def _moved(place: Array, velocity: Array) -> tuple[Array, Array]:
-    """Places one iteration later, and velocities; who would leave the cube stops at its face and turns round."""
+    """Move for one iteration; who would leave the cube stops at its face and turns round."""
     ahead = place + velocity
     outside = (ahead < 0.0) | (ahead > 1.0)
     return np.clip(ahead, 0.0, 1.0), np.where(outside, -REBOUND * velocity, velocity)
 
 
-def _costs(evaluator: Evaluator, frame: Frame, particles: Array, best: Best) -> Array:
-    measured = evaluator.problem.measured
+def _costs(evaluator: Evaluator, frame: CoordinateFrame, particles: Array, best: Best) -> Array:
+    measured = evaluator.regression.measured
     costs = np.full(len(particles), NO_SHAPE)
     for i, predicted in enumerate(evaluator.predict_many(list(particles))):
         if predicted is not None:

@@ -82,7 +82,7 @@ def _collect(
 
 
 def _number(where: str, key: str, text: str, problems: list[Problem]) -> float | None:
-    """A cell as a number; None if it is empty, or, with a problem, if it is none."""
+    """Read a cell as a number; return None if it is empty, or, with a problem, if it is none."""
     if not text.strip():
         return None
     try:

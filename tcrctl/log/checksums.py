@@ -13,17 +13,24 @@ from tcrctl.signals import Checksums, StepRecord
 
 # Part of the file format: another list or order makes every log look changed.
 _GIVEN: Final = attrgetter(
-    "measurement.t", "measurement.nodes", "measurement.valid", "measurement.drive",
-    "reference.t", "reference.position", "reference.normal", "reference.ahead_position",
-    "reference.ahead_normal", "reference.drive",
-)  # fmt: skip
+    "measurement.t",
+    "measurement.nodes",
+    "measurement.valid",
+    "measurement.drive",
+    "reference.t",
+    "reference.position",
+    "reference.normal",
+    "reference.ahead_position",
+    "reference.ahead_normal",
+    "reference.drive",
+)
 _STATE: Final = attrgetter(
     "estimate.q", "estimate.v", "estimate.disturbance", "info.predicted_tension", "info.integral"
 )
 
 
 def checksums(step: StepRecord) -> Checksums:
-    """Digests of a step that has its full state.
+    """Return the digests of a step that has its full state.
 
     Each is the CRC-32 (of zlib) over the little-endian numbers of its fields in the order above; a field that is
     None counts as the one byte 0xff.

@@ -59,7 +59,7 @@ def encode(name: str, record: object) -> bytes:
 
 
 def filled(name: str, record: object, omitted: Fields = frozenset()) -> Any:
-    """Message of type ``name`` with the values of a record, but those of the fields ``omitted``.
+    """Return the message of type ``name`` with the values of a record, but those of the fields ``omitted``.
 
     Raises:
         ValueError: As :func:`encode`.
@@ -107,7 +107,7 @@ def decode(name: str, data: bytes) -> Any:
 
 
 def parsed(name: str, data: bytes) -> Any:
-    """Message of type ``name``, arrays as bytes.
+    """Return the message of type ``name``, arrays as bytes.
 
     Raises:
         google.protobuf.message.DecodeError: If ``data`` is not such a message.

@@ -71,7 +71,7 @@ OPTIONAL: Final = ("truth", "measurement.raw")
 
 
 def meanings(record: type = StepRecord, prefix: str = "") -> dict[str, str]:
-    """What every column is, by its name: the words of :mod:`tcrctl.signals`; empty where those say nothing."""
+    """Say what every column is, by name: the words of :mod:`tcrctl.signals`; empty where those say nothing."""
     said = dict(_ATTRIBUTE.findall(inspect.cleandoc(record.__doc__ or "")))
     found: dict[str, str] = {}
     for name, kind in get_type_hints(record).items():
@@ -127,7 +127,7 @@ def stack(steps: Iterable[StepRecord], names: Collection[str] | None = None) -> 
 
 
 def _value(step: StepRecord, path: list[str]) -> Any:
-    """Value at a path; None if a record on the way is lacking."""
+    """Return the value at a path; None if a record on the way is lacking."""
     value: Any = step
     for part in path:
         if value is None:
@@ -152,7 +152,7 @@ def _stacked(column: Column, values: list[Any]) -> NDArray[Any]:
 
 
 def _longest_empty(column: Column) -> tuple[int, ...]:
-    """Shape of a quantity no step has: a normal has three components even then."""
+    """Return the shape of a quantity no step has: a normal has three components even then."""
     if column.field == "normal":
         return (3,)
     return (0, column.width) if column.width else (0,)

@@ -16,12 +16,17 @@ from tcrctl.signals import StepRecord
 
 #: What a lean step leaves out; its checksum is compared instead.
 _SPARSE: Final = (
-    "estimate.q", "estimate.v", "estimate.disturbance", "info.predicted_tension", "info.integral", "truth.q"
-)  # fmt: skip
+    "estimate.q",
+    "estimate.v",
+    "estimate.disturbance",
+    "info.predicted_tension",
+    "info.integral",
+    "truth.q",
+)
 
 
 def quantities(*left_out: str) -> dict[str, Column]:
-    """Quantities of a step by path, in the order in which they come about; without parts ``left_out``.
+    """Return the quantities of a step by path, in the order in which they come about; without parts ``left_out``.
 
     Args:
         *left_out: How the paths of what is left out begin.
@@ -51,7 +56,7 @@ class Difference:
     ulps: int | None
 
     def as_json(self) -> dict[str, Any]:
-        """The object ``first_difference`` of ``replay --json``; numbers that are not finite become text."""
+        """Return the object ``first_difference`` of ``replay --json``; numbers that are not finite become text."""
         values = {"recorded": _plain(self.recorded), "replayed": _plain(self.replayed)}
         return {"step": self.step, "field": self.field, **values, "ulps": self.ulps}
 
@@ -89,7 +94,7 @@ class Deviation:
             self.largest = max(float(np.max(size)), 0.0 if math.isnan(self.largest) else self.largest)
 
     def as_json(self) -> dict[str, Any]:
-        """An item of ``deviations`` in ``replay --json``."""
+        """Return an item of ``deviations`` in ``replay --json``."""
         return {
             "field": self.field,
             "unit": self.unit,
@@ -166,7 +171,7 @@ class Comparison:
         return bool(was == now)
 
     def _close(self, was: Any, now: Any) -> Any:
-        """True where a number is within the tolerance; bits of NaN do not count if there is one."""
+        """Tell where a number is within the tolerance; bits of NaN do not count if there is one."""
         if not self._tolerant or np.asarray(was).dtype != np.float64:
             return _bits(was) == _bits(now)
         return np.isclose(now, was, rtol=self._rtol, atol=self._atol, equal_nan=True)
@@ -183,7 +188,7 @@ class Comparison:
 
 
 def _get(get: Callable[[StepRecord], Any], step: StepRecord) -> Any:
-    """Value of a step; None if the record that it belongs to is lacking."""
+    """Return the value of a step; None if the record that it belongs to is lacking."""
     try:
         return get(step)
     except AttributeError:
@@ -200,7 +205,7 @@ def _bits(values: Any) -> Any:
 
 
 def ulps(one: Any, other: Any) -> int | None:
-    """Representable numbers between two finite floats; None for anything else."""
+    """Return the representable numbers between two finite floats; None for anything else."""
     if not (
         isinstance(one, float) and isinstance(other, float) and math.isfinite(one) and math.isfinite(other)
     ):
@@ -209,13 +214,13 @@ def ulps(one: Any, other: Any) -> int | None:
 
 
 def _rank(number: float) -> int:
-    """Index of a float in the order of all floats; -0.0 comes right before 0.0."""
+    """Return the index of a float in the order of all floats; -0.0 comes right before 0.0."""
     bits = int(np.float64(number).view(np.int64))
     return bits if bits >= 0 else -(bits & 0x7FFF_FFFF_FFFF_FFFF) - 1
 
 
 def _sizes(was: Any, now: Any) -> NDArray[np.float64]:
-    """Absolute differences of all numbers, empty if that has no meaning."""
+    """Return the absolute differences of all numbers, empty if that has no meaning."""
     if isinstance(was, str) or was is None or now is None or np.shape(was) != np.shape(now):
         return np.zeros(0)
     size = np.abs(np.asarray(now, dtype=np.float64) - np.asarray(was, dtype=np.float64)).ravel()

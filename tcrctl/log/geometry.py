@@ -12,8 +12,8 @@ from tcrctl.signals import Array
 
 
 @dataclass(frozen=True, slots=True)
-class CableRoute:
-    """Name and path of one cable, from the base to the ring it ends on.
+class CableHoles:
+    """Name of one cable and the holes it runs through, from the base to the ring it ends on.
 
     Attributes:
         name: Name of the cable.
@@ -26,7 +26,7 @@ class CableRoute:
     weights: Array
 
     def points(self, nodes: Array) -> Array:
-        """Hole positions (n_holes, 3) [m] for node positions ``nodes`` (n_nodes, 3) [m]."""
+        """Return the hole positions (n_holes, 3) [m] for node positions ``nodes`` (n_nodes, 3) [m]."""
         hole: Array = np.einsum("hj,hjx->hx", self.weights, nodes[self.nodes])
         return hole
 
@@ -37,7 +37,7 @@ class LogGeometry:
 
     Attributes:
         n_modules: Modules below the fixed base.
-        cables: One route per cable, in the order of ``drive``.
+        cables: Holes of every cable, in the order of ``drive``.
         marker_nodes: Row of the node that each row of ``Measurement.nodes`` measures (n_markers,).
         tip_ring: Module whose ring is the end of eq. (11).
         full_scale_tension: Tension drawn in full red [N]; a slack cable is blue.
@@ -49,7 +49,7 @@ class LogGeometry:
     """
 
     n_modules: int
-    cables: tuple[CableRoute, ...]
+    cables: tuple[CableHoles, ...]
     marker_nodes: tuple[int, ...]
     tip_ring: int
     full_scale_tension: float = 20.0

@@ -43,7 +43,7 @@ _CHUNK_BYTES: Final = 2**20
 
 
 def new_mcap(stream: IO[bytes], chunk_size: int = _CHUNK_BYTES) -> Writer:
-    """Writer with the header of our logs; ends a zstd chunk by itself when it is longer than ``chunk_size``."""
+    """Start a writer with the header of our logs, which ends a zstd chunk that is longer than ``chunk_size``."""
     # Offsets into the summary are optional, and mcap writes wrong ones for groups without entries.
     writer = Writer(stream, chunk_size, CompressionType.ZSTD, use_summary_offsets=False)
     writer.start(profile="", library=LIBRARY)
@@ -133,7 +133,7 @@ class McapFile:
         return number
 
     def time_ns(self, t: float) -> int:
-        """Unix nanoseconds of time ``t`` [s] of the run.
+        """Return the Unix nanoseconds of time ``t`` [s] of the run.
 
         Raises:
             ValueError: If ``t`` is not finite or outside what the file can hold.
@@ -185,7 +185,7 @@ class McapFile:
         self.unflushed = 0
 
     def cut_short(self, path: Path, stop: Mapping[str, str]) -> None:
-        """After a failed write: cut off what is not whole, and write the stop record where that was.
+        """Cut off what a failed write has left, and write the stop record in its place.
 
         If the room is not enough, the last whole chunk has to give way. There is no index; ``tcrctl recover`` makes
         one.

@@ -52,7 +52,8 @@ def _nested(controller: dict[str, Any]) -> dict[str, Any]:
 
 def _without_news(controller: dict[str, Any]) -> dict[str, Any]:
     """Return a controller that does without what it did not have when it ran, and has by default now."""
-    found, prediction = {"dither": "off", **controller}, controller.get("prediction", "multi_step")
+    found = {"dither": "off", **controller}
+    prediction = controller.get("prediction", "multi_step")
     dynamic = controller.get("model", "dynamic") == "dynamic"
     if isinstance(prediction, str):
         prediction = {"kind": prediction}

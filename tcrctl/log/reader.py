@@ -76,7 +76,7 @@ class Log:
                 raise LogError(self.path, f"event {message.sequence} cannot be decoded: {error}") from error
 
     def columns(self, names: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
-        """One array per quantity, first axis = step; see :mod:`tcrctl.log.columns` for names and units.
+        """Return one array per quantity, first axis = step; see :mod:`tcrctl.log.columns` for names and units.
 
         Args:
             names: Which ones; all if None.
@@ -141,7 +141,7 @@ def _split(names: str) -> tuple[str, ...]:
 
 
 def _indexed_records(path: Path) -> list[McapRecord] | None:
-    """Header, metadata, attachments and channels by way of the footer's index; None if there is none."""
+    """Return the header, metadata, attachments and channels by way of the footer's index; None if there is none."""
     try:
         with open(path, "rb") as stream:
             reader = SeekingReader(stream, record_size_limit=os.fstat(stream.fileno()).st_size)
@@ -155,7 +155,7 @@ def _indexed_records(path: Path) -> list[McapRecord] | None:
 
 
 def _cut_records(path: Path) -> Iterator[McapRecord]:
-    """Header, metadata, attachments and channels of a file without index."""
+    """Return the header, metadata, attachments and channels of a file without index."""
     for record in Scan(path):
         if isinstance(record, Header | Metadata | Attachment | Channel):
             yield record

@@ -11,7 +11,7 @@ from tcrctl.signals import Array
 
 
 def _outer_map() -> Array:
-    """Matrix (10, 16) that takes (r00, r01, ..., r22, 1) to the rows of 4 q q', q = (x, y, z, w)."""
+    """Return the matrix (10, 16) that takes (r00, r01, ..., r22, 1) to the rows of 4 q q', q = (x, y, z, w)."""
     outer = np.zeros((4, 4, 10))
     outer[np.arange(4), np.arange(4), 9] = 1.0
     outer[3, 3, [0, 4, 8]] = 1.0
@@ -27,7 +27,7 @@ _OUTER: Final = _outer_map()
 
 
 def ring_frames(corners: Array) -> tuple[Array, Array]:
-    """Poses of rings.
+    """Return the poses of rings.
 
     Args:
         corners: Nodes 1, 2, 3 of every ring (n, 3 nodes, 3) [m], counter-clockwise seen from the normal.
@@ -46,7 +46,7 @@ def ring_frames(corners: Array) -> tuple[Array, Array]:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Row-wise cross product; numpy's own costs ten times as much on so few rows."""
+    """Return row-wise cross products; numpy's own cost ten times as much on so few rows."""
     product: Array = a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
     return product
 
@@ -57,7 +57,7 @@ def _unit(a: Array) -> Array:
 
 
 def quaternions(rotation: Array) -> Array:
-    """Unit quaternions x, y, z, w (n, 4) of rotation matrices (n, 3, 3).
+    """Return the unit quaternions x, y, z, w (n, 4) of rotation matrices (n, 3, 3).
 
     4 q q' is linear in the matrix; its row with the largest diagonal entry, normalised, is q without
     cancellation.
@@ -70,7 +70,7 @@ def quaternions(rotation: Array) -> Array:
 
 
 def quaternion_of_normal(normal: Array) -> Array:
-    """Quaternion x, y, z, w (4,) of the smallest rotation from +z to the unit vector ``normal`` (3,)."""
+    """Return the quaternion x, y, z, w (4,) of the smallest rotation from +z to the unit vector ``normal`` (3,)."""
     if normal[2] < -1.0 + 1e-12:  # half a turn: every horizontal axis will do
         return np.array([1.0, 0.0, 0.0, 0.0])
     raw = np.array([-normal[1], normal[0], 0.0, 1.0 + normal[2]])
@@ -79,5 +79,5 @@ def quaternion_of_normal(normal: Array) -> Array:
 
 
 def drawable(*arrays: NDArray[np.floating]) -> bool:
-    """True if every number is finite and below 1e6 m: what is not must neither be drawn nor overflow here."""
+    """Tell if all numbers are finite and below 1e6 m: what is not must neither be drawn nor overflow here."""
     return all(bool((np.abs(array) < 1e6).all()) for array in arrays)

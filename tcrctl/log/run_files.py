@@ -37,7 +37,8 @@ class RunFiles:
         Args:
             log: The log.
         """
-        self._path, self._contents = log.path, {name: data for name, (_, data) in log.attachments.items()}
+        self._path = log.path
+        self._contents = {name: data for name, (_, data) in log.attachments.items()}
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -19,13 +19,13 @@ from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.geometry import CableHoles, LogGeometry
 from tcrctl.robot.module import rings
 from tcrctl.signals import Array
 
 WORLD: Final = "world"
 REFERENCE: Final = "reference"
-"""Frame of the wanted end on ``/tf``."""
+"""Coordinate frame of the wanted end on ``/tf``."""
 
 Colour = tuple[float, float, float]
 
@@ -56,7 +56,7 @@ class Scene:
         self._springs = geometry.springs.ravel()
 
     def encode(self, nodes: Array, tension: Array, when: Timestamp) -> bytes:
-        """Serialised SceneUpdate of what moves.
+        """Serialise the SceneUpdate of what moves.
 
         Args:
             nodes: Node positions (n_nodes, 3) [m].
@@ -75,7 +75,7 @@ class Scene:
         return update.SerializeToString()
 
     def encode_static(self, nodes: Array, with_axis: bool, when: Timestamp) -> bytes:
-        """Serialised SceneUpdate of what never changes in its frame.
+        """Serialise the SceneUpdate of what never changes in its frame.
 
         Args:
             nodes: Node positions of any shape (n_nodes, 3) [m]; only the radii of the rings matter.
@@ -106,7 +106,7 @@ class Scene:
         return update.SerializeToString()
 
     def _draw_cable(
-        self, update: SceneUpdate, cable: CableRoute, tension: float, nodes: Array, when: Timestamp
+        self, update: SceneUpdate, cable: CableHoles, tension: float, nodes: Array, when: Timestamp
     ) -> None:
         share = min(1.0, max(0.0, tension / self._geometry.full_scale_tension))
         colour = (round(share, 3), 0.1, round(1.0 - share, 3))
@@ -115,7 +115,7 @@ class Scene:
 
 
 def _locked(update: SceneUpdate, name: str, frame: str, when: Timestamp) -> SceneEntity:
-    """Entity that follows its frame."""
+    """Return the entity that follows its frame."""
     return update.entities.add(id=name, frame_id=frame, timestamp=when, frame_locked=True)
 
 

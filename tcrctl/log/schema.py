@@ -179,7 +179,7 @@ def _add_field(message: descriptor_pb2.DescriptorProto, number: int, field: Fiel
 
 
 def _pool(*, wire: bool) -> descriptor_pool.DescriptorPool:
-    """Pool with every message type; the wire form is proto2, where each field knows whether it is present."""
+    """Fill a pool with every message type; in proto2's wire form, where a field knows whether it is present."""
     file = descriptor_pb2.FileDescriptorProto(
         name="tcrctl/v1/log.proto", package=PACKAGE, syntax="proto2" if wire else "proto3"
     )
@@ -197,17 +197,17 @@ _WIRE = _pool(wire=True)
 
 
 def public_descriptor(name: str) -> Descriptor:
-    """Descriptor of message type ``name`` as stored in the file."""
+    """Return the descriptor of message type ``name`` as stored in the file."""
     return _PUBLIC.FindMessageTypeByName(f"{PACKAGE}.{name}")
 
 
 def wire_class(name: str) -> Any:
-    """Message class of type ``name`` in which arrays are bytes; wire-compatible with the public one."""
+    """Return the message class of type ``name`` in which arrays are bytes; wire-compatible with the public one."""
     return message_factory.GetMessageClass(_WIRE.FindMessageTypeByName(f"{PACKAGE}.{name}"))
 
 
 def descriptor_set(descriptor: Descriptor) -> bytes:
-    """Serialised FileDescriptorSet of a message type and all its imports: an MCAP ``protobuf`` schema."""
+    """Serialise the FileDescriptorSet of a message type and all its imports: an MCAP ``protobuf`` schema."""
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: FileDescriptor) -> None:
@@ -223,7 +223,7 @@ def descriptor_set(descriptor: Descriptor) -> bytes:
 
 
 def units(name: str = "Step", prefix: str = "") -> dict[str, str]:
-    """Unit of every field of message type ``name`` that has one, by dotted path."""
+    """Return the unit of every field of message type ``name`` that has one, by dotted path."""
     found: dict[str, str] = {}
     for field in MESSAGES[name]:
         if field.kind in MESSAGES:

@@ -93,8 +93,9 @@ class StepDecoder:
 
 
 def _rounded(step: StepRecord) -> StepRecord:
-    """The step with single precision where no controller has seen the numbers."""
-    timing, truth = Timing(*(_single(seconds) for seconds in astuple(step.timing))), step.truth
+    """Return the step with single precision where no controller has seen the numbers."""
+    timing = Timing(*(_single(seconds) for seconds in astuple(step.timing)))
+    truth = step.truth
     if truth is not None:
         truth = replace(
             truth,
@@ -116,29 +117,29 @@ def _with_markers(step: StepRecord, numbers: NDArray[np.int32]) -> StepRecord:
 
 
 def bits(nodes: NDArray[np.float32]) -> NDArray[np.int32]:
-    """Bit patterns of floats (n, 3) as integers (3 n,)."""
+    """Return the bit patterns of floats (n, 3) as integers (3 n,)."""
     return np.ascontiguousarray(nodes, "<f4").reshape(-1).view("<i4")
 
 
 def zigzag(numbers: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Small numbers of either sign (n,) to small ones without: 0, -1, 1, -2 become 0, 1, 2, 3."""
+    """Map small numbers of either sign (n,) to small ones without: 0, -1, 1, -2 become 0, 1, 2, 3."""
     return (numbers << 1) ^ (numbers >> 31)
 
 
 def unzigzag(numbers: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Inverse of :func:`zigzag`."""
+    """Return the inverse of :func:`zigzag`."""
     positive = numbers.view("<u4")
     signed: NDArray[np.int32] = (positive >> 1).astype("<i4") ^ -(positive & 1).astype("<i4")
     return signed
 
 
 def planes(numbers: NDArray[np.int32]) -> bytes:
-    """Bytes of integers (n,) by significance, the lowest of all first: (4, n)."""
+    """Return the bytes of integers (n,) by significance, the lowest of all first: (4, n)."""
     return numbers.view(np.uint8).reshape(-1, 4).T.tobytes()
 
 
 def from_planes(data: bytes) -> NDArray[np.int32]:
-    """Inverse of :func:`planes`.
+    """Return the inverse of :func:`planes`.
 
     Raises:
         ValueError: If the number of bytes does not make whole numbers.

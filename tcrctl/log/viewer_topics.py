@@ -36,12 +36,12 @@ SCENE_RATE_HZ: Final = 5.0
 
 
 def stride(period: float, rate_hz: float) -> int:
-    """Steps between two messages so that no more than ``rate_hz`` of them appear per second."""
+    """Return steps between two messages so that no more than ``rate_hz`` of them appear per second."""
     return max(1, int(np.ceil(1.0 / (rate_hz * period) - 1e-9)))
 
 
 def stamp(time_ns: int) -> Timestamp:
-    """Protobuf timestamp of an instant in Unix nanoseconds."""
+    """Return the Protobuf timestamp of an instant in Unix nanoseconds."""
     seconds, nanos = divmod(time_ns, 1_000_000_000)
     return Timestamp(seconds=seconds, nanos=nanos)
 
@@ -52,7 +52,7 @@ _TURN: Final = 2.0**14
 
 
 def rounded(values: Array, grid: float) -> list[list[float]]:
-    """Rows of ``values`` in multiples of 1 / ``grid``."""
+    """Return the rows of ``values`` in multiples of 1 / ``grid``."""
     rows: list[list[float]] = (np.round(values * grid) / grid).tolist()
     return rows
 
@@ -81,7 +81,7 @@ class ViewerTopics:
         )
 
     def messages(self, record: StepRecord, time_ns: int) -> Iterator[tuple[str, bytes]]:
-        """Topic and encoded message of everything due at this step, whose log time is ``time_ns``."""
+        """Return the topic and encoded message of everything due at this step, whose log time is ``time_ns``."""
         when = stamp(time_ns)
         if record.k % self._viewer_stride == 0:
             yield from self._poses(record, when)
@@ -94,12 +94,12 @@ class ViewerTopics:
             yield "/scene", self._scene.encode(nodes, _tension(record), when)
 
     def static(self, record: StepRecord, nodes: Array, when: Timestamp) -> bytes:
-        """Encoded message of what stands still in its frame, for nodes (n_nodes, 3) [m] of the step."""
+        """Encode what stands still in its frame, for nodes (n_nodes, 3) [m] of the step."""
         self._static_written = True
         return self._scene.encode_static(nodes, record.reference.normal is not None, when)
 
     def _nodes(self, record: StepRecord) -> Array | None:
-        """Node positions (n_nodes, 3) [m] if the step has a shape that can be drawn."""
+        """Return the node positions (n_nodes, 3) [m] if the step has a shape that can be drawn."""
         shape = _shape(record)
         return shape.reshape(-1, 3) if shape.size == 3 * self._geometry.n_nodes and drawable(shape) else None
 
@@ -130,7 +130,7 @@ class ViewerTopics:
         return message.SerializeToString()
 
     def _measured(self, measurement: Measurement) -> Pose | None:
-        """Pose of the end ring from its three markers, None if one of them was not seen."""
+        """Return the pose of the end ring from its three markers, None if one of them was not seen."""
         rows = self._tip_markers
         if rows is None or max(rows) >= len(measurement.nodes) or not measurement.valid[rows].all():
             return None

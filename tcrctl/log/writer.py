@@ -194,7 +194,7 @@ class LogWriter:
         self._check()
 
     def _run(self) -> None:
-        """Body of the writer thread."""
+        """Run the writer thread."""
         try:
             self._write_until_stop()
         except Exception as failure:
@@ -231,7 +231,7 @@ class LogWriter:
             flush_at = self._flush_if_due(flush_at)
 
     def _next(self, flush_at: float) -> StepRecord | Event | dict[str, str] | None:
-        """Next item; None if a flush is due or nothing came for a while."""
+        """Return the next item; None if a flush is due or nothing came for a while."""
         with suppress(Empty):
             return self._queue.get_nowait()
         self._written.set()

@@ -1,12 +1,16 @@
 """The control loop: simulated, recorded or real, it sees protocols only.
 
+One control step:
+
     reference ------------------------+
                                       v
     plant.read -> estimator -> controller -> guard -> plant.write -> record
         ^             ^                                    |
         |             +------------- applied --------------+
         +------------------------- robot <-----------------+
-"""  # fmt: skip
+
+The robot is that of the plant: equations, a bench, or a record.
+"""
 
 from __future__ import annotations
 
@@ -97,7 +101,9 @@ def tick(parts: Parts, k: int, applied: Command | None) -> Ticked:
         RunInterruptedError: If a signal asked to stop.
         DeviceError: If the plant failed.
     """
-    plant, t, now = parts.plant, k * parts.period, parts.pace.now
+    plant = parts.plant
+    t = k * parts.period
+    now = parts.pace.now
     late, t0 = parts.pace.wait(t), now()
     measured, truth = plant.read(), plant.truth()
     t1 = now()

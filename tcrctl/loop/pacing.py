@@ -22,16 +22,16 @@ class Pace(Protocol):
         ...
 
     def now(self) -> float:
-        """Time of a clock that never jumps, for measuring durations [s]."""
+        """Return the time of a clock that never jumps, for measuring durations [s]."""
         ...
 
     def time(self) -> float:
-        """Time of the run [s]: that of the step that is due now; 0 before the first."""
+        """Return the time of the run [s]: that of the step that is due now; 0 before the first."""
         ...
 
 
 def _go_on() -> None:
-    """Nothing asks the run to stop."""
+    """Do nothing: nothing asks the run to stop."""
 
 
 class Unpaced:
@@ -80,7 +80,10 @@ class RealTime:
             clock: Never jumps [s].
             sleep: Waits for a time [s].
         """
-        self._period, self._check, self._clock, self._sleep = period, check, clock, sleep
+        self._period = period
+        self._check = check
+        self._clock = clock
+        self._sleep = sleep
         self._start: float | None = None
 
     def wait(self, t: float) -> float:

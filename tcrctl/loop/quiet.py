@@ -35,7 +35,7 @@ def quiet_interpreter(priority: int | None, warn: Callable[[str], None]) -> Iter
 
 
 def _raise_priority(priority: int, warn: Callable[[str], None]) -> tuple[int, os.sched_param] | None:
-    """Scheduler and parameters to go back to; None if nothing was changed."""
+    """Return the scheduler and parameters to go back to; None if nothing was changed."""
     if not hasattr(os, "sched_setscheduler"):
         warn("this system has no SCHED_FIFO; fifo_priority is ignored")
         return None

@@ -67,5 +67,5 @@ class SafetyGuard:
 
 
 def _highest(values: Array) -> float:
-    """Largest value, NaN if one of them is."""
+    """Return the largest value, NaN if one of them is."""
     return float(np.max(values, initial=-np.inf))

@@ -113,7 +113,9 @@ def factor(A: Array) -> bool:
 @njit(cache=True, error_model="numpy")
 def solve_forward(U: Array, X: Array) -> None:
     """Overwrite the right-hand sides ``X`` (n b, r) by U'^-1 X, the first half of :func:`solve`."""
-    n, bands, b = U.shape[0], U.shape[1], U.shape[2]
+    n = U.shape[0]
+    bands = U.shape[1]
+    b = U.shape[2]
     for j in range(n):
         here = X[j * b : (j + 1) * b]
         solve_transposed(U[j, 0], here)
@@ -124,7 +126,9 @@ def solve_forward(U: Array, X: Array) -> None:
 @njit(cache=True, error_model="numpy")
 def solve_backward(U: Array, X: Array) -> None:
     """Overwrite ``X`` (n b, r) by U^-1 X, the second half of :func:`solve`."""
-    n, bands, b = U.shape[0], U.shape[1], U.shape[2]
+    n = U.shape[0]
+    bands = U.shape[1]
+    b = U.shape[2]
     for j in range(n - 1, -1, -1):
         here = X[j * b : (j + 1) * b]
         for d in range(1, min(bands, n - j)):
@@ -171,7 +175,7 @@ def multiply_columns(A: Array, X: Array, out: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def to_dense(A: Array) -> Array:
-    """Dense symmetric matrix (n b, n b) of a block-banded one; for tests and small offline work."""
+    """Return the dense symmetric matrix (n b, n b) of a block-banded one; for tests and small offline work."""
     size = A.shape[0] * A.shape[2]
     dense = np.empty((size, size))
     multiply_columns(A, np.eye(size), dense)

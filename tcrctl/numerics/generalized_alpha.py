@@ -28,8 +28,8 @@ class Coefficients(NamedTuple):
 
 
 @njit(cache=True)
-def coefficients(spectral_radius: float, step: float) -> Coefficients:
-    """Coefficients for ``spectral_radius`` ρ in [0, 1] at infinite frequency and ``step`` h [s], (15)."""
+def coefficients(spectral_radius: float, h: float) -> Coefficients:
+    """Return (15) for ``spectral_radius`` ρ in [0, 1] at infinite frequency and internal step ``h`` [s]."""
     rho = spectral_radius
     alpha_m = (2.0 * rho - 1.0) / (rho + 1.0)
     alpha_f = rho / (rho + 1.0)
@@ -40,6 +40,6 @@ def coefficients(spectral_radius: float, step: float) -> Coefficients:
         alpha_f,
         beta,
         gamma,
-        gamma / (beta * step),
-        (1.0 - alpha_m) / (beta * step * step * (1.0 - alpha_f)),
+        gamma / (beta * h),
+        (1.0 - alpha_m) / (beta * h * h * (1.0 - alpha_f)),
     )

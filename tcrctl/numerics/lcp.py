@@ -118,7 +118,7 @@ def lcp_residuals(M: Array, q: Array, z: Array) -> tuple[float, float, float]:
 
 @njit(cache=True)
 def _usable(M: Array, q: Array) -> bool:
-    """Whether M (n, n) and q (n,) fit and are finite."""
+    """Tell whether M (n, n) and q (n,) fit and are finite."""
     n = q.size
     if M.shape[0] != n or M.shape[1] != n:
         return False

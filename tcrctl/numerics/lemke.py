@@ -142,7 +142,7 @@ def _subtract_basis_product(C: Array, basis: Rows, x: Array, y: Array, size: Arr
 
 @njit(cache=True)
 def _leaving_row(T: Array, column: Array, noise: Array, basis: Rows) -> int:
-    """Lexicographic minimum ratio test on the rows [B^-1 p, B^-1] / column; -1 if no row limits the step.
+    """Do the lexicographic minimum ratio test on rows [B^-1 p, B^-1] / column; -1 if no row limits the step.
 
     Rows tie if their ratio is below every ratio after all basic values are raised by TIE (Harris), so no
     basic value falls below -TIE of itself. A tied artificial variable leaves first: that ends the method.
@@ -206,7 +206,9 @@ def refined(C: Array, p: Array, T: Array, basis: Rows) -> Array:
         Basic values x (n,), free of the errors that the pivots accumulated.
     """
     n = p.size
-    x, residual, size = np.empty(n), np.empty(n), np.empty(n)
+    x = np.empty(n)
+    residual = np.empty(n)
+    size = np.empty(n)
     for i in range(n):
         x[i] = T[0, i]
     for _ in range(REFINEMENTS):

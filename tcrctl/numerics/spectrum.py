@@ -45,14 +45,14 @@ class Spectrum(NamedTuple):
         return float(np.abs(self.eigenvalues[0])) if self.eigenvalues.size else np.nan
 
 
-def derivative(apply: Map, size: int, step: float, *, central: bool = False) -> Map:
-    """Product of the Jacobian of a map at 0 with a vector, by differences.
+def derivative(apply: Map, size: int, deviation: float, *, central: bool = False) -> Map:
+    """Return the product of the Jacobian of a map at 0 with a vector, by differences.
 
     Args:
         apply: The map from deviations (size,) to images.
         size: Number of its arguments.
-        step: Length of the deviation that the difference is taken over.
-        central: Two-sided: twice the work, errors of second order in the step.
+        deviation: Its length, that the difference is taken over.
+        central: Two-sided: twice the work, errors of second order in the deviation.
     """
     base = None if central else apply(np.zeros(size))
 
@@ -60,7 +60,7 @@ def derivative(apply: Map, size: int, step: float, *, central: bool = False) -> 
         length = float(np.linalg.norm(w))
         if length == 0.0:
             return np.zeros(size)
-        reach = step / length
+        reach = deviation / length
         if base is None:
             return (apply(reach * w) - apply(-reach * w)) / (2.0 * reach)
         return (apply(reach * w) - base) / reach
@@ -68,9 +68,9 @@ def derivative(apply: Map, size: int, step: float, *, central: bool = False) -> 
     return product
 
 
-def jacobian(apply: Map, size: int, step: float) -> Array:
-    """Jacobian of a map at 0, column by column, by central differences; arguments as in :func:`derivative`."""
-    return _columns(derivative(apply, size, step, central=True), size)
+def jacobian(apply: Map, size: int, deviation: float) -> Array:
+    """Return a map's Jacobian at 0, column by column, by central differences; arguments as :func:`derivative`."""
+    return _columns(derivative(apply, size, deviation, central=True), size)
 
 
 def largest_eigenvalues(product: Map, start: Array, count: int = 4) -> Spectrum:

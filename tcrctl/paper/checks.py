@@ -22,7 +22,7 @@ SWING: Final = 0.02
 
 
 def table2() -> dict[str, Any]:
-    """Distance of the end displacements of tcr700 from those measured, Table II of [TCR]."""
+    """Return the distance of the end displacements of tcr700 from those measured, Table II of [TCR]."""
     measured = measured_displacements()
     found = model_displacements(build_robot(load_robot("tcr700")))
     errors = {name: 1e3 * float(np.linalg.norm(found[name] - measured[name])) for name in measured}
@@ -30,7 +30,7 @@ def table2() -> dict[str, Any]:
 
 
 def plant_step() -> dict[str, Any]:
-    """Wall time per internal step of 1 ms of the simulated tcr700 while its drives swing."""
+    """Return the wall time per internal step of 1 ms of the simulated tcr700 while its drives swing."""
     robot = build_robot(load_robot("tcr700"))
     plant = SimulatedPlant(SimulatedSettings(kind="simulated", step_ms=1.0), robot, PERIOD, seed=0)
     per_write = round(PERIOD / 1e-3)

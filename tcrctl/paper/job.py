@@ -73,7 +73,9 @@ def do(order: tuple[Job, Path]) -> Done:
     try:
         result, code = job.run(folder)
     except TcrctlError as error:
-        result, code, reason = {}, error.exit_code, str(error)
+        result = {}
+        code = error.exit_code
+        reason = str(error)
     else:  # a missed criterion is no failure
         reason = "" if code in (0, 3) and result else str(result.get("reason") or f"exit code {code}")
     return Done(job, result, reason, time.monotonic() - begin, code)

@@ -42,7 +42,7 @@ class OverSeeds:
     stopped: Share
 
     def cells(self) -> tuple[str, ...]:
-        """Texts in the order of ``TITLES``."""
+        """Return texts in the order of ``TITLES``."""
         found = self.spread
         interval = "" if math.isnan(found.low) else f" [{number(found.low)}, {number(found.high)}]"
         return (
@@ -52,14 +52,14 @@ class OverSeeds:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """For programs; infinite numbers become null."""
+        """Return the object for programs; infinite numbers become null."""
         numbers = {name: getattr(self.spread, name) for name in ("median", "low", "high", "worst")}
         finite = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
         return {"n": self.spread.n, **finite, "stopped": self.stopped.count}
 
 
 def experiments_of(row: Row) -> tuple[str, ...]:
-    """Experiments that a row measures as they are shipped; none if it measures something else, or time."""
+    """Return the experiments that a row measures as shipped; none if it measures something else, or time."""
     runs = [job for job in row.jobs if isinstance(job, Run) and not job.overrides]
     return tuple(job.experiment for job in runs) if len(runs) == len(row.jobs) and row.unit != "ms" else ()
 

@@ -77,7 +77,7 @@ class Report:
         return f"missed: {', '.join(self.missed)}" if self.missed else ""
 
     def notes(self) -> list[str]:
-        """Sentences that belong below the table."""
+        """Return sentences that belong below the table."""
         verdicts = [line.verdict for line in self.lines if line.row.must is not None]
         met, goals, idle = (
             sum(v in wanted for v in verdicts) for wanted in (("met", "goal"), ("goal",), ("not run",))
@@ -105,7 +105,7 @@ class Report:
         return os.cpu_count() or 1
 
     def as_json(self) -> dict[str, Any]:
-        """The object of ``tcrctl paper --json``."""
+        """Return the object of ``tcrctl paper --json``."""
         status = "aborted" if self.interruption else "failed" if self.missed else "success"
         return {
             "status": status,
@@ -163,7 +163,9 @@ def run_paper(
     Raises:
         DeviceError: If the folder cannot be made or written to.
     """
-    folder, done, begin = make_run_folder(out, "paper"), dict[Job, Done](), time.monotonic()
+    folder = make_run_folder(out, "paper")
+    done = dict[Job, Done]()
+    begin = time.monotonic()
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
 
     interruption: RunInterruptedError | DeviceError | None = None

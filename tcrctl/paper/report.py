@@ -15,9 +15,13 @@ from tcrctl.paper.row import Row, Verdict
 TITLES: Final = ("work", "paper", "must reach", "going to", "measured", "verdict")
 BAD: Final[tuple[Verdict, ...]] = ("missed", "failed")
 _WORDS: Final[Mapping[Verdict, str]] = {
-    "goal": "goal met", "met": "met", "missed": "MISSED", "shown": "-", "failed": "FAILED",
+    "goal": "goal met",
+    "met": "met",
+    "missed": "MISSED",
+    "shown": "-",
+    "failed": "FAILED",
     "not run": "not run",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +47,7 @@ class Line:
     plants: OverSeeds | None = None
 
     def cells(self, *, with_plants: bool = False) -> tuple[str, ...]:
-        """Texts in the order of :func:`titles`."""
+        """Return texts in the order of :func:`titles`."""
         row, sign = self.row, ">= " if self.row.at_least else ""
         work = f"{row.work} [{row.unit}]" if row.unit else row.work
         bars = ("" if limit is None else f"{sign}{limit:g}" for limit in (row.must, row.goal))
@@ -53,7 +57,7 @@ class Line:
         return (work, row.paper, *bars, self.measured, verdict, *(plants if with_plants else ()))
 
     def as_json(self) -> dict[str, Any]:
-        """The item of ``rows`` in ``tcrctl paper --json``."""
+        """Return the item of ``rows`` in ``tcrctl paper --json``."""
         row = self.row
         return {
             "name": row.name,
@@ -98,12 +102,12 @@ def _is_failure(row: Row, item: Done) -> bool:
 
 
 def titles(lines: Sequence[Line]) -> tuple[str, ...]:
-    """Titles of the columns; those of many plants if some row was run on them."""
+    """Return the titles of the columns; those of many plants if some row was run on them."""
     return (*TITLES, *PLANT_TITLES) if any(line.plants for line in lines) else TITLES
 
 
 def cells(lines: Sequence[Line]) -> list[tuple[str, ...]]:
-    """Texts of all rows, a cell for every title."""
+    """Return texts of all rows, a cell for every title."""
     return [line.cells(with_plants=any(line.plants for line in lines)) for line in lines]
 
 

@@ -86,7 +86,7 @@ def total(name: str) -> Callable[[Sequence[Result]], float | None]:
 
 
 def found(result: Any, name: str) -> list[Any]:
-    """Values of a dotted name in a result, one per item of the lists on the way; None where there is none."""
+    """Return a dotted name's values in a result, one per item of lists on the way; None where there is none."""
     if isinstance(result, list):
         return [value for item in result for value in found(item, name)]
     if not name:

@@ -22,9 +22,14 @@ LASER: Final = Run("laser_pipe", alone=True)
 SCAN: Final = Run("box_scan", alone=True)
 FAST_SCAN: Final = Run(
     "box_scan",
-    ("trajectory.approach_s=14", "trajectory.insert_s=4", "trajectory.tilt_s=6", "trajectory.turn_s=26",
-     "trajectory.return_s=6"),
-)  # fmt: skip
+    (
+        "trajectory.approach_s=14",
+        "trajectory.insert_s=4",
+        "trajectory.tilt_s=6",
+        "trajectory.turn_s=26",
+        "trajectory.return_s=6",
+    ),
+)
 POLYLINE: Final = Run("box_polyline")
 DYNAMIC: Final = {total_s: Run(f"dynamic_{total_s}s", alone=True) for total_s in (10, 45, 90)}
 STATIC: Final = {
@@ -44,7 +49,7 @@ X_MAX: Final = worst("x_error_mm.max")
 
 
 def inspection(results: Sequence[Result]) -> str:
-    """What was found in the box, and whether it was touched."""
+    """Return what was found in the box, and whether it was touched."""
     (task,) = (result["task"] for result in results)
     touched = f"collision at {task['collision_s']:.3g} s" if task["collision"] else "no collision"
     return f"{task['detected']} of {len(task['objects'])}, {touched}"
@@ -64,7 +69,7 @@ def ending(name: str) -> Callable[[Sequence[Result]], str]:
 
 
 def beams(results: Sequence[Result]) -> str:
-    """How many beams pass."""
+    """Return how many beams pass."""
     passed = found(results[0], "task.targets.beam_passes")
     return f"{sum(passed)} of {len(passed)}"
 

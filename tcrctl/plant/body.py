@@ -68,7 +68,7 @@ class Body:
             t: Time, for messages [s].
 
         Raises:
-            DivergenceError: If a time step did not converge.
+            DivergenceError: If an internal step did not converge.
         """
         converged, residual, smallest, _ = dynamics.advance(
             self.model, self.state, speed, duration, self._rule, force, self._work, self._scratch
@@ -77,7 +77,7 @@ class Body:
             raise DivergenceError(t, residual, smallest)
 
     def follow(self, cable: Array, h: float, force: Array, t: float) -> None:
-        """One internal step ``h`` [s] to the cable taken in at its end (m,) [m], and what slowly follows.
+        """Go one internal step ``h`` [s] to the cable taken in at its end (m,) [m], and let follow what is slow.
 
         Raises:
             DivergenceError: If it did not converge.
@@ -86,14 +86,14 @@ class Body:
         if self._hysteresis is not None:
             self._hysteresis.give_way(self.state.q)
         if self._creep is not None:
-            grown, slip = self._creep.step(self._elastic(), h), self.state.slip
+            grown, slip = self._creep.grow(self._elastic(), h), self.state.slip
             if slip is None:
                 self.late += grown
             else:
                 slip.rest[:] += grown
 
     def _elastic(self) -> Array:
-        """Elastic elongations of the cables (m,) or, where they rub, of their stretches (n_holes,) [m]."""
+        """Return elastic elongations of the cables (m,) or, where they rub, of their stretches (n_holes,) [m]."""
         slip = self.state.slip
         if slip is None:
             return np.asarray(self.tension / self.model.cables[:, sliding_cable.STIFFNESS])

@@ -3,7 +3,7 @@
     shapes of the robot -> exposure -> markers beside their nodes -> frame that is off -> noise, outliers -> losses
 
 A frame that is lost is the last one again, with the time at which that was taken, as a bench reports it.
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Seen = Callable[[NDArray[np.bool_], float], NDArray[np.bool_]]
 """Which markers can be seen at a time, out of those that carry one."""
 
 
-class Frame(NamedTuple):
+class CameraFrame(NamedTuple):
     """What the cameras report.
 
     Attributes:
@@ -103,10 +103,13 @@ class ImperfectCameras:
     ) -> None:
         """Draw what stays; ``latency`` [s], ``noise`` per coordinate [m]."""
         self._random = np.random.default_rng([_seed(settings, seed), 1])
-        self._settings, self._latency, self._noise = settings, latency, noise
+        self._settings = settings
+        self._latency = latency
+        self._noise = noise
         self.draw = draw_cameras(settings, markers, seed)
         self._shapes: deque[tuple[float, Array]] = deque()
-        self._markers, self._last = markers, Frame(0.0, np.zeros((markers, 3)), np.zeros(markers, np.bool_))
+        self._markers = markers
+        self._last = CameraFrame(0.0, np.zeros((markers, 3)), np.zeros(markers, np.bool_))
         self._coming, self._arrival, self._newest = 0, latency + self._late(), 0.0
 
     def watch(self, t: float, nodes: Array) -> None:
@@ -114,10 +117,10 @@ class ImperfectCameras:
         self._shapes.append((t, nodes))
 
     def without_noise(self) -> None:
-        """From now on report what is seen without noise."""
+        """Report what is seen without noise from now on."""
         self._noise = 0.0
 
-    def read(self, now: float, carries: NDArray[np.bool_], seen: Seen) -> Frame:
+    def read(self, now: float, carries: NDArray[np.bool_], seen: Seen) -> CameraFrame:
         """Report the newest frame.
 
         Args:
@@ -131,18 +134,18 @@ class ImperfectCameras:
             nodes = self._reported(self._shape(exposed))
             valid = seen(carries, exposed)
             valid &= self._random.random(self._markers) >= self._settings.lost_markers
-            self._last = Frame(exposed, nodes, valid)
+            self._last = CameraFrame(exposed, nodes, valid)
         return self._last
 
     def _happens(self, share: float) -> bool:
         return bool(self._random.random() < share)
 
     def _late(self) -> float:
-        """Time by which a frame comes later than usual [s]."""
+        """Return the time by which a frame comes later than usual [s]."""
         return 1e-3 * self._settings.age_jitter_ms * abs(float(self._random.standard_normal()))
 
     def _exposure(self, now: float) -> float:
-        """When the newest frame that has arrived was taken; before the run everything stood still."""
+        """Return when the newest frame that has arrived was taken; before the run everything stood still."""
         rate = self._settings.rate_hz
         if rate is None:
             return max(now - self._latency - self._late(), self._last.t)
@@ -153,7 +156,7 @@ class ImperfectCameras:
         return self._newest
 
     def _shape(self, t: float) -> Array:
-        """Ring nodes at ``t``; older shapes are not asked for any more."""
+        """Return the ring nodes at ``t``; older shapes are not asked for any more."""
         shapes = self._shapes
         while len(shapes) > 1 and shapes[1][0] <= t:
             shapes.popleft()
@@ -163,7 +166,7 @@ class ImperfectCameras:
         return np.asarray(x0 + (x1 - x0) * max(0.0, (t - t0) / (t1 - t0)))
 
     def _reported(self, nodes: Array) -> Array:
-        """Markers in the frame that the cameras take for that of the robot (n_markers, 3) [m]."""
+        """Return the markers in the frame that the cameras take for that of the robot (n_markers, 3) [m]."""
         markers = self.draw.in_frame(self.draw.beside(nodes))
         markers = markers + self._noise * self._random.standard_normal(markers.shape)
         wild = self._random.random(self._markers) < self._settings.outliers.share

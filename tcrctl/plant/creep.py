@@ -6,7 +6,7 @@ Beside its elastic elongation T / k a cable has one more per branch, u_i, which 
 
 In rest it has already come, so that the robot starts where its rest lengths say; only changes count. It is a change
 of unstretched lengths between internal steps, exact for a tension that is constant during the step. Source: [FL75].
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Creep:
         self._time = np.array([branch.time_s for branch in branches])
         self.late = np.outer(self._strength, elastic)
 
-    def step(self, elastic: Array, h: float) -> Array:
+    def grow(self, elastic: Array, h: float) -> Array:
         """Return by how much unstretched lengths grow (n,) [m] in ``h`` [s] under elongations T / k (n,) [m]."""
         share = -np.expm1(-h / self._time)
         grown = share[:, None] * (np.outer(self._strength, elastic) - self.late)

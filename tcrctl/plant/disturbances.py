@@ -13,7 +13,7 @@ from tcrctl.signals import Array
 
 
 def pushed(weight: Array, pushes: Sequence[PushSettings], t: float) -> Array:
-    """Weight plus the pushes that act at time ``t``.
+    """Return the weight plus the pushes that act at time ``t``.
 
     Args:
         weight: Weight of the node coordinates (3 n_nodes,) [N].
@@ -35,7 +35,7 @@ def pushed(weight: Array, pushes: Sequence[PushSettings], t: float) -> Array:
 def seen(
     valid: NDArray[np.bool_], rings: NDArray[np.int64], dropouts: Sequence[DropoutSettings], t: float
 ) -> NDArray[np.bool_]:
-    """Which markers the cameras see at time ``t``.
+    """Return which markers the cameras see at time ``t``.
 
     Args:
         valid: Which they see when all is well (n_markers,).

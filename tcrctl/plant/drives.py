@@ -1,7 +1,7 @@
 """Drives of the simulated plant: what the controller asks for, what the cables get, what is reported.
 
 Between two internal steps a set-point is a straight line, s(t) = s_0 + v t. A position loop of time constant τ that
-follows it from x_0 is after a step h at
+follows it from x_0 is after an internal step h at
 
     x = x_0 + h / σ (S - x_0),    σ = h / (1 - e^(-h/τ)),    S = s_0 + v (σ - τ)
 
@@ -48,12 +48,13 @@ class SimulatedDrives:
         set_point: Where the drives shall be (m,) [m].
     """
 
-    def __init__(self, settings: DriveSettings, start: Array, step: float) -> None:
-        """Rest at drive lengths ``start`` (m,) [m], to be moved in steps of ``step`` [s]."""
+    def __init__(self, settings: DriveSettings, start: Array, h: float) -> None:
+        """Rest at drive lengths ``start`` (m,) [m], to be moved in internal steps of ``h`` [s]."""
         self._settings = settings
-        lag, keep = settings.lag_s, math.exp(-step / settings.lag_s) if settings.lag_s > 0.0 else 0.0
-        sampled = step / (1.0 - keep)
-        self._step, self._ahead = step, sampled - lag
+        lag = settings.lag_s
+        keep = math.exp(-h / settings.lag_s) if settings.lag_s > 0.0 else 0.0
+        sampled = h / (1.0 - keep)
+        self._h, self._ahead = h, sampled - lag
         self._servos = [
             Servo(
                 replace(servo, lag_s=sampled, speed_um_s=math.inf),
@@ -75,9 +76,9 @@ class SimulatedDrives:
         return np.array([in_counts(servo.position, count) for servo in self._servos]) / UM
 
     def move(self, speed: Array) -> Array:
-        """Let the set-points move at ``speed`` (m,) [m/s] for one step; return the cable taken in then (m,) [m]."""
+        """Let the set-points move at ``speed`` (m,) [m/s] for one internal step; return what that takes in [m]."""
         followed = self.set_point + speed * self._ahead
-        self.set_point = self.set_point + speed * self._step
+        self.set_point = self.set_point + speed * self._h
         for servo, target in zip(self._servos, (UM * followed).tolist(), strict=True):
-            servo.step(target, self._step)
+            servo.advance(target, self._h)
         return self.cable()

@@ -1,7 +1,9 @@
 """The robot that a simulated plant moves: not quite the one that the controller knows.
 
+Every difference has its place on the way from the file to the robot:
+
     description of the plant's robot -> unlike parts -> built -> other material -> strung otherwise
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 

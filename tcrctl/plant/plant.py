@@ -11,7 +11,7 @@ class Plant(Protocol):
     """A robot that can be measured and driven."""
 
     def read(self) -> Measurement:
-        """The newest measurement."""
+        """Return the newest measurement."""
         ...
 
     def write(self, command: Command) -> Command:
@@ -19,7 +19,7 @@ class Plant(Protocol):
         ...
 
     def truth(self) -> Truth | None:
-        """What a simulated plant knows about itself at the time of the last ``read``; None on a rig."""
+        """Return what a simulated plant knows about itself at the time of the last ``read``; None on a rig."""
         ...
 
     def close(self) -> None:

@@ -1,7 +1,9 @@
 """A control period of a plant with real drives, cables, springs and cameras, one internal step after the other.
 
+One internal step:
+
     set-points -> drives -> cable taken in -> robot, whose springs give way and whose cables creep -> cameras
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 
@@ -61,9 +63,11 @@ class Reality:
             period: Control period [s].
             seed: Of what is random and has no seed of its own.
         """
-        self.drives, self._body, self._rows = drives, body, rows
+        self.drives = drives
+        self._body = body
+        self._rows = rows
         self._count = steps(settings, period)
-        self._step = period / self._count
+        self._h = period / self._count
         self.cameras = ImperfectCameras(
             settings.cameras or CameraSettings(),
             rows.size,
@@ -82,9 +86,9 @@ class Reality:
             t: Time at its beginning [s].
 
         Raises:
-            DivergenceError: If a time step did not converge.
+            DivergenceError: If an internal step did not converge.
         """
-        h = self._step
+        h = self._h
         for i in range(self._count):
             self._body.follow(self.drives.move(speed), h, force, t + i * h)
             self._watch(t + (i + 1) * h)

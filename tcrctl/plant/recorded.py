@@ -57,7 +57,10 @@ class Recorded:
             limits: Those of the plant that was recorded if they are known.
             reports_set_points: Its drives were measured to be where they should be.
         """
-        self._steps, self._limits, self._next_k, self.limited = steps, limits, 0, None
+        self._steps = steps
+        self._limits = limits
+        self._next_k = 0
+        self.limited = None
         self._reports_set_points = reports_set_points
         self._set_point: Array | None = None
 
@@ -77,7 +80,7 @@ class Recorded:
         return step.measurement
 
     def truth(self) -> Truth | None:
-        """What a simulated plant knew about itself."""
+        """Return what a simulated plant knew about itself."""
         return self.step.truth
 
     def write(self, command: Command) -> Command:
@@ -87,10 +90,10 @@ class Recorded:
         return self.step.applied
 
     def close(self) -> None:
-        """Nothing to leave safe."""
+        """Do nothing: there is nothing to leave safe."""
 
     def state(self) -> tuple[Array, Array]:
-        """State (q, v) that an estimator of kind ``exact`` was given.
+        """Return the state (q, v) that an estimator of kind ``exact`` was given.
 
         Raises:
             InputError: If the log holds the full state of some steps only.
@@ -104,19 +107,19 @@ class Recorded:
         return estimate.q.copy(), estimate.v.copy()
 
     def position(self, t: Array) -> Array:
-        """Recorded end positions wanted now and at the prediction instants (n, 3) [m]; ``t`` (n,) must be these."""
+        """Return recorded end positions wanted now and at the prediction instants ``t`` (n,) [s], (n, 3) [m]."""
         reference = self.step.reference
         return self._as_asked(t, np.vstack([reference.position, reference.ahead_position]))
 
     def normal(self, t: Array) -> Array | None:
-        """Recorded end normals wanted now and at the prediction instants (n, 3), or None."""
+        """Return recorded end normals wanted now and at the prediction instants (n, 3), or None."""
         reference = self.step.reference
         if reference.normal is None or reference.ahead_normal is None:
             return None
         return self._as_asked(t, np.vstack([reference.normal, reference.ahead_normal]))
 
     def drive(self, t: Array) -> Array | None:
-        """Recorded drive lengths wanted at the first prediction instant (1, m) [m], or None."""
+        """Return recorded drive lengths wanted at the first prediction instant (1, m) [m], or None."""
         drive = self.step.reference.drive
         return None if drive is None else self._as_asked(t, drive[None])
 

@@ -56,7 +56,7 @@ def _modules(
     masses: np.random.Generator,
     geometry: np.random.Generator,
 ) -> tuple[ModuleDifference, ...]:
-    """Mass and node places of every module."""
+    """Return the mass and node places of every module."""
     given = {entry.module: entry for entry in robot.modules.each}
     drawn = []
     for module in range(1, robot.modules.count + 1):
@@ -74,7 +74,7 @@ def _modules(
 def _springs(
     robot: RobotDescription, scatter: ScatterSettings, random: np.random.Generator
 ) -> tuple[SpringBetween, ...]:
-    """Young's modulus of every spring: those of a joint deviate together, and each a little from the others."""
+    """Draw every spring's Young's modulus: those of a joint deviate together, and each a little on its own."""
     given = {frozenset(entry.nodes): entry for entry in robot.springs.each}
     per_joint, joints = len(robot.springs.joint), robot.modules.count
     drawn, common = [], 1.0
@@ -91,7 +91,7 @@ def _springs(
 def _routes(
     robot: RobotDescription, scatter: ScatterSettings, rest: Array, random: np.random.Generator
 ) -> tuple[FreeRoute, ...]:
-    """Angle of every hole; cables have the rest lengths of the robot as designed."""
+    """Return the angle of every hole; cables have the rest lengths of the robot as designed."""
     drawn = []
     for route, length in zip(cable_routes(robot), rest.tolist(), strict=True):
         moved = scatter.holes_deg * random.standard_normal(len(route.holes))
@@ -106,7 +106,7 @@ def _routes(
 def _tilt(
     robot: RobotDescription, scatter: ScatterSettings, random: np.random.Generator
 ) -> tuple[float, float]:
-    """Turns of the base about x and y [deg]; its direction is drawn."""
+    """Draw the turns of the base about x and y [deg]."""
     direction = random.uniform(0.0, 2.0 * math.pi)
     x, y = robot.base.tilt_deg
     return x + scatter.tilt_deg * math.cos(direction), y + scatter.tilt_deg * math.sin(direction)

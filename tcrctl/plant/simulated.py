@@ -74,10 +74,10 @@ class SimulatedPlant:
         return self.reality is None and self._body.state.slip is None
 
     def start(self) -> None:
-        """Nothing to arm in simulation."""
+        """Do nothing: there is nothing to arm in simulation."""
 
     def read(self) -> Measurement:
-        """Ring nodes as they were one latency ago, with noise, in single precision; what the drives report."""
+        """Return ring nodes one latency ago, with noise, in single precision, and what the drives report."""
         if self.reality is not None:
             frame = self.reality.cameras.read(self.time, self._valid, self._visible)
             reported = self.reality.drives.reported()
@@ -99,7 +99,7 @@ class SimulatedPlant:
         """Move the drives at ``command.speed`` for one period; drives stop at the ends of their stroke.
 
         Raises:
-            DivergenceError: If a time step did not converge.
+            DivergenceError: If an internal step did not converge.
         """
         force = pushed(self.robot.weight, self._pushes, self.time)
         if self.reality is not None:
@@ -118,7 +118,7 @@ class SimulatedPlant:
         return applied
 
     def truth(self) -> Truth:
-        """True end pose, tensions and shape now."""
+        """Return the true end pose, tensions and shape now."""
         q = self._body.state.q
         return Truth(
             position=pose.position(q, self.robot.tip),
@@ -128,7 +128,7 @@ class SimulatedPlant:
         )
 
     def state(self) -> tuple[Array, Array]:
-        """True node positions [m] and velocities [m/s] now, (3 n_nodes,) each."""
+        """Return the true node positions [m] and velocities [m/s] now, (3 n_nodes,) each."""
         return self._body.state.q.copy(), self._body.state.v.copy()
 
     def without_noise(self) -> None:
@@ -138,7 +138,7 @@ class SimulatedPlant:
             self.reality.cameras.without_noise()
 
     def memory(self) -> Mapping[str, Kept]:
-        """State of the integrator without the fixed base, drives, shapes that the cameras have yet to report."""
+        """Return the integrator's state without the base, drives, and shapes that cameras have yet to report."""
         first, x = 3 * FIXED, self._body.state
         seen = {f"seen_{i}": Kept(q[first:], POSITION) for i, q in enumerate(self._seen)}
         return {
@@ -151,4 +151,4 @@ class SimulatedPlant:
         }
 
     def close(self) -> None:
-        """Nothing to leave safe in simulation."""
+        """Do nothing: there is nothing to leave safe in simulation."""

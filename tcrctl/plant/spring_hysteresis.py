@@ -7,7 +7,7 @@ It is an elastic bar of stiffness k_f whose unstretched length gives way when it
 With these, a spring that is stretched and released by Δ passes a loop whose width 2 F_y is the share s of its force
 range k Δ; in motions below 2 δ_y it is elastic. Time steps see an elastic bar. Afterwards its force is cut down to
 F_y, which can only take energy: dissipative by construction, whatever the step. Source: [IW66] for one element.
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SpringHysteresis:
         self.model = model._replace(bars=seen, bar_nodes=nodes)
 
     def give_way(self, q: Array) -> float:
-        """Cut forces down after a time step that ended at ``q`` (3 n_nodes,) [m]; return the energy lost [J]."""
+        """Cut forces down after an internal step to ``q`` (3 n_nodes,) [m]; return the energy lost [J]."""
         stretch = self._lengths(q) - self._own[:, bar.REST]
         held = np.clip(stretch, -self.yield_length, self.yield_length)
         self._own[:, bar.REST] += stretch - held

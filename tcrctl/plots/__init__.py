@@ -32,8 +32,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURES: Final = (
-    "overview", "path", "position", "orientation", "normal", "error", "drives", "speeds", "tensions", "timing",
-)  # fmt: skip
+    "overview",
+    "path",
+    "position",
+    "orientation",
+    "normal",
+    "error",
+    "drives",
+    "speeds",
+    "tensions",
+    "timing",
+)
 """Every kind of figure: the name of its module."""
 
 FORMATS: Final = ("png", "pdf", "svg")

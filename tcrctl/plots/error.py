@@ -50,7 +50,7 @@ def _draw(panel: Axes, index: int, history: History, error: Array, name: str, un
 
 
 def _scale(panel: Axes) -> None:
-    """From zero to the largest error; logarithmic if one run's would flatten another's."""
+    """Scale from zero to the largest error; logarithmic if one run's would flatten another's."""
     largest = [float(np.nanmax(line.get_ydata())) for line in panel.lines]
     if max(largest) > APART * min(largest) > 0.0:
         panel.set(yscale="log", ylim=(1e-2 * min(largest), 2.0 * max(largest)))

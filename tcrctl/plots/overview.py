@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
-from tcrctl.analysis.skeleton import read_skeleton
+from tcrctl.analysis.structure import read_structure
 from tcrctl.plots import style
 from tcrctl.plots.space import draw_body, equal_scale
 from tcrctl.signals import Array
@@ -43,7 +43,7 @@ def _body(axes: Any, histories: Sequence[History]) -> None:
     shape = histories[0].shape
     if len(shape):
         nodes = 1e3 * shape[len(shape) // 3]
-        draw_body(axes, nodes, read_skeleton(histories[0].log, len(nodes)))
+        draw_body(axes, nodes, read_structure(histories[0].log, len(nodes)))
         shown.append(nodes)
     for i, path in enumerate(paths):
         axes.plot(*path.T, **style.line(i))
@@ -72,7 +72,7 @@ def _drawing(panel: Axes, histories: Sequence[History]) -> None:
 
 
 def _plane(paths: Sequence[Array]) -> tuple[int, int]:
-    """Axes of the projection in which the path is largest; from above if it hardly moves."""
+    """Return the axes of the projection in which the path is largest; from above if it hardly moves."""
     extent = np.ptp(np.concatenate(paths), axis=0)
     if np.max(extent) < 1e-3 * _POINT_MM:
         return 0, 1

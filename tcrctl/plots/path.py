@@ -60,7 +60,7 @@ def _draw(
 
 
 def _spread(path: Array, t: Array) -> Array:
-    """Steps (n,) at which arrows are drawn: equally far apart along the path, and along time where it rests."""
+    """Return steps (n,) at which arrows are drawn: equally far apart on the path, and in time where it rests."""
     moved = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     clock = (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)
     progress = moved / max(float(moved[-1]), 1e-9) + 0.2 * clock

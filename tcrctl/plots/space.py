@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from tcrctl.analysis.skeleton import Skeleton
+from tcrctl.analysis.structure import Structure
 from tcrctl.plots import style
 from tcrctl.robot.module import apexes, rings
 from tcrctl.signals import Array
@@ -16,27 +16,27 @@ from tcrctl.signals import Array
 _CIRCLE: Final = 2.0 * np.pi * np.arange(37) / 36
 
 
-def draw_body(axes: Any, nodes: Array, skeleton: Skeleton | None) -> None:
+def draw_body(axes: Any, nodes: Array, structure: Structure | None) -> None:
     """Draw a robot.
 
     Args:
         axes: Three-dimensional axes.
         nodes: Node positions (n_nodes, 3), in the unit of the axes.
-        skeleton: Its springs and cables; only rings and rods are drawn without it.
+        structure: Its springs and cables; only rings and rods are drawn without it.
     """
     for ring, apex in zip(rings(nodes), apexes(nodes), strict=True):
         axes.plot(*ring_outline(ring).T, color=style.GREY, lw=0.9)
         for node in ring:
             axes.plot(*np.stack([node, apex]).T, color=style.GREY, lw=0.6)
-    if skeleton is not None:
-        for ends in skeleton.springs:
+    if structure is not None:
+        for ends in structure.springs:
             axes.plot(*nodes[ends].T, color=style.GREEN, lw=0.6)
-        for cable in skeleton.cables:
+        for cable in structure.cables:
             axes.plot(*cable.points(nodes).T, color=style.VERMILION, lw=0.6)
 
 
 def ring_outline(corners: Array) -> Array:
-    """Points (37, 3) on the circle through three nodes (3, 3) of a ring."""
+    """Return points (37, 3) on the circle through three nodes (3, 3) of a ring."""
     centre = corners.mean(axis=0)
     arm, other = corners[0] - centre, corners[1] - corners[2]
     across = other * np.linalg.norm(arm) / np.linalg.norm(other)

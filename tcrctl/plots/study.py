@@ -46,7 +46,7 @@ def draw_study(spec: StudySpec, runs: Sequence[Run]) -> Iterator[tuple[str, Figu
 
 
 def save_study_figures(spec: StudySpec, runs: Sequence[Run], folder: Path, file_format: str) -> list[Path]:
-    """Draw all figures of a study into a folder; returns the files.
+    """Draw all figures of a study into a folder; return the files.
 
     Raises:
         DeviceError: If a file cannot be written.
@@ -75,7 +75,7 @@ def _title(measure: str) -> str:
 
 
 def boxes(samples: Samples, measure: str) -> Figure:
-    """Box per group with every run as a mark; runs that were stopped are counted at the right."""
+    """Draw a box per group with every run as a mark; runs that were stopped are counted at the right."""
     figure = new_figure(0.9 + 0.32 * len(samples))
     axes = figure.subplots()
     finite = [[v for v in values if math.isfinite(v)] for values in samples.values()]
@@ -97,7 +97,7 @@ def boxes(samples: Samples, measure: str) -> Figure:
 
 
 def distributions(samples: Samples, measure: str) -> Figure:
-    """Share of the runs of a group that is no larger than a value; a curve that ends below 1 has stopped runs."""
+    """Draw the share of runs that are no larger than a value, per group; below 1 at its end: stopped runs."""
     figure = new_figure(3.2)
     axes: Axes = figure.subplots()
     for i, (name, values) in enumerate(samples.items()):
@@ -112,14 +112,14 @@ def distributions(samples: Samples, measure: str) -> Figure:
 
 
 def _two_factors(spec: StudySpec, runs: Sequence[Run]) -> tuple[str, str] | None:
-    """The last two factors that have several levels, few enough to be drawn."""
+    """Return the last two factors that have several levels, few enough to be drawn."""
     levels = {f: {run.levels.get(f) for run, _ in runs} for f in spec.factors}
     several = [f for f, found in levels.items() if 2 <= len(found) <= MOST_GROUPS]
     return (several[-2], several[-1]) if len(several) >= 2 else None
 
 
 def heat_map(runs: Sequence[Run], measure: str, down: str, along: str) -> Figure:
-    """Median of a measure over two factors; crossed out where half of the runs or more were stopped."""
+    """Draw the median of a measure over two factors; crossed out where half of the runs or more were stopped."""
     rows, columns = (list(dict.fromkeys(run.levels[f] for run, _ in runs)) for f in (down, along))
     medians = _medians(runs, measure, (down, rows), (along, columns))
     figure = new_figure(1.2 + 0.35 * len(rows))
@@ -143,7 +143,7 @@ def heat_map(runs: Sequence[Run], measure: str, down: str, along: str) -> Figure
 def _medians(
     runs: Sequence[Run], measure: str, down: tuple[str, list[str]], along: tuple[str, list[str]]
 ) -> Array:
-    """Median per cell (rows, columns); NaN where there is no run, infinite where half were stopped."""
+    """Return the median per cell (rows, columns); NaN where there is no run, infinite where half were stopped."""
     cells: dict[tuple[int, int], list[float]] = {}
     for run, row in runs:
         value = value_of(row, measure)

@@ -69,7 +69,7 @@ def new_figure(height_in: float) -> Figure:
 
 
 def time_panels(count: int, *, height_in: float = 1.5, columns: int = 1) -> tuple[Figure, list[Axes]]:
-    """Figure with ``count`` panels that share the time axis; ``height_in`` is that of one row."""
+    """Make a figure with ``count`` panels that share the time axis; ``height_in`` is that of one row."""
     rows = -(-count // columns)
     figure = new_figure(height_in * rows + 0.6)
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
@@ -85,7 +85,8 @@ def time_panels(count: int, *, height_in: float = 1.5, columns: int = 1) -> tupl
 
 def span(panels: Sequence[Axes], histories: Sequence[History]) -> None:
     """Let the time axis end where the longest run does."""
-    first, last = min(h.t[0] for h in histories), max(h.t[-1] for h in histories)
+    first = min(history.t[0] for history in histories)
+    last = max(history.t[-1] for history in histories)
     for panel in panels:
         panel.set_xlim(first, last if last > first else first + 1.0)
     figure = panels[0].get_figure(root=True)
@@ -94,7 +95,7 @@ def span(panels: Sequence[Axes], histories: Sequence[History]) -> None:
 
 
 def line(index: int) -> dict[str, Any]:
-    """Colour and dashes of the ``index``-th of several equal lines."""
+    """Return the colour and dashes of the ``index``-th of several equal lines."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
 
 
@@ -132,7 +133,7 @@ def _same(a: Array, b: Array) -> bool:
 
 
 def legend(figure: Figure, panels: Sequence[Axes]) -> None:
-    """One legend above all panels, every name once."""
+    """Draw one legend above all panels, every name once."""
     found: dict[str, Any] = {}
     for panel in panels:
         handles, names = panel.get_legend_handles_labels()
@@ -164,7 +165,7 @@ def limit(panel: Axes, values: Array, bounds: Sequence[float | None], name: str,
 
 
 def _is_near(bound: float, values: Array) -> bool:
-    """True if drawing the limit too leaves most of the panel to the values."""
+    """Tell if drawing the limit too leaves most of the panel to the values."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     reach = max(0.35 * (high - low), 0.1 * max(abs(low), abs(high)))
     return low - reach <= bound <= high + reach

@@ -21,12 +21,12 @@ def draw(histories: Sequence[History]) -> Figure:
     paced = [history for history in histories if np.any(history.lateness > 0.0)]
     figure = style.new_figure(2.9 + 1.9 * bool(paced))
     rows = figure.subplots(1 + bool(paced), 2, width_ratios=(2.2, 1.0), squeeze=False)
-    compute = [1e3 * h.compute for h in histories]
+    compute = [1e3 * history.compute for history in histories]
     _row(rows[0], histories, compute, "control time [ms]")
     period = 1e3 * float(np.median(histories[0].period))
     rows[0][1].set_title(f"period {period:g} ms", loc="right", fontsize=7)
     if paced:
-        _row(rows[1], paced, [1e3 * h.lateness for h in paced], "lateness [ms]")
+        _row(rows[1], paced, [1e3 * history.lateness for history in paced], "lateness [ms]")
     rows[-1][0].set_xlabel("t [s]")
     rows[-1][1].set_xlabel("steps")
     return figure

@@ -36,7 +36,9 @@ class WhatIf:
         """Drive speeds wanted, recorded and replayed, and below it their difference."""
         from matplotlib.figure import Figure  # heavy
 
-        t, was, now = np.array(self._t), np.array(self._recorded), np.array(self._replayed)
+        t = np.array(self._t)
+        was = np.array(self._recorded)
+        now = np.array(self._replayed)
         figure = Figure(figsize=(8.0, 5.5), layout="constrained")
         above, below = figure.subplots(2, 1, sharex=True)
         for cable in range(was.shape[1] if was.ndim == 2 else 0):

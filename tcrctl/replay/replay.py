@@ -89,26 +89,28 @@ def replay(
     environment = changes(log)
     announce(environment)
     origin = rebuild(log, overrides)
-    session = _Session(log, origin, window, tolerance, watch)
+    work = _Replay(log, origin, window, tolerance, watch)
     begin = time.perf_counter()
     with ExitStack() as stack:
-        writer = None if out is None else stack.enter_context(open_replayed(out, log, origin, session.robot))
-        ended = session.run(None if writer is None else writer.step, progress)
-        result = session.result(ended, environment, time.perf_counter() - begin, out)
+        writer = None if out is None else stack.enter_context(open_replayed(out, log, origin, work.robot))
+        ended = work.run(None if writer is None else writer.step, progress)
+        result = work.result(ended, environment, time.perf_counter() - begin, out)
         if writer is not None:
             found = {"status": "success", "reason": "", "replay": json.dumps(result.as_json())}
             writer.finish(found)
     return result
 
 
-class _Session:
+class _Replay:
     """One replay in progress."""
 
     def __init__(
         self, log: Log, origin: Origin, window: Window, tolerance: Tolerance, watch: Watch | None
     ) -> None:
         spec, self._watch = origin.wanted.spec, watch
-        self._log, self._origin, self._window = log, origin, window
+        self._log = log
+        self._origin = origin
+        self._window = window
         self._kind, self._period = spec.plant.kind, float(spec.controller.period_s)
         self.robot = build_robot(origin.wanted.robot)
         reports = _reports_set_points(origin.recorded.spec.plant)
@@ -123,7 +125,7 @@ class _Session:
         self._done = 0
 
     def _references(self, first: StepRecord | None) -> Trajectory:
-        """Recorded references; those of the trajectory itself if the controller looks at other instants."""
+        """Return recorded references; those of the trajectory itself if the controller looks at other instants."""
         recorded = self._origin.recorded.spec
         if first is None or self._origin.wanted is self._origin.recorded:
             return self._plant
@@ -136,7 +138,9 @@ class _Session:
 
     def run(self, record: Record | None, progress: Progress) -> RecordingEndedError | str:
         """Replay to the end of the window or of what there is; return why it ended."""
-        parts, total, applied = self._parts(), _total(self._log, self._window), None
+        parts = self._parts()
+        total = _total(self._log, self._window)
+        applied = None
         for k in itertools.count():
             try:
                 step, broken = tick(parts, k, applied)
@@ -154,7 +158,7 @@ class _Session:
         return ""
 
     def _parts(self) -> Parts:
-        """Recorded plant and references, rebuilt estimator and controller; a changed one may fail and go on."""
+        """Build the parts: recorded plant and references, estimator and controller; a changed one may fail."""
         experiment = Experiment(self._origin.wanted, self._origin.wanted.spec, self.robot, self._trajectory)
         limits = experiment.safety if self._origin.wanted is self._origin.recorded else NO_LIMITS
         return Parts(
@@ -189,7 +193,7 @@ class _Session:
         seconds: float,
         out: Path | None,
     ) -> Replay:
-        """What was found, given why the replay ended."""
+        """Return what was found, given why the replay ended."""
         found = self._comparison
         gap = isinstance(ended, RecordingEndedError) and ended.found is not None
         stopped = ended if isinstance(ended, str) else ""
@@ -246,7 +250,7 @@ def _same_instants(one: Controller, other: Controller) -> bool:
 
 
 def _total(log: Log, window: Window) -> int | None:
-    """Steps to be replayed, if the log says how many it has."""
+    """Return the number of steps to be replayed, if the log says how many it has."""
     written = (log.stop or {}).get("steps", "")
     if not written.isdecimal():
         return None

@@ -79,7 +79,7 @@ class Replay:
         return 0 if self.whole and self.first_difference is None else 3
 
     def as_json(self) -> dict[str, Any]:
-        """The object of ``replay --json``."""
+        """Return the object of ``replay --json``."""
         return {
             "status": self.status,
             "reason": self.reason,

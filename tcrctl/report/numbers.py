@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.analysis.history import History
-from tcrctl.analysis.skeleton import read_skeleton
+from tcrctl.analysis.structure import read_structure
 from tcrctl.robot.module import NODES, module_count
 from tcrctl.signals import Array
 
@@ -108,13 +108,13 @@ def _chart(
 
 
 def _robot(history: History) -> dict[str, Any] | None:
-    """Shapes and what joins their nodes; None if the log has no shapes."""
+    """Return the shapes and what joins their nodes; None if the log has no shapes."""
     if not len(history.shape):
         return None
     frames = _frames(history)
     nodes = history.shape[frames]
     middle, scale = _grid(nodes)
-    skeleton = read_skeleton(history.log, nodes.shape[1])
+    structure = read_structure(history.log, nodes.shape[1])
     return {
         "t": _floats(history.t[history.shape_step[frames]]),
         "count": nodes.shape[1],
@@ -122,41 +122,41 @@ def _robot(history: History) -> dict[str, Any] | None:
         "nodes": _bytes(np.round((nodes - middle) / scale).astype("<i2")),
         "middle": middle.tolist(),
         "scale": scale,
-        "tip": module_count(nodes.shape[1]) if skeleton is None else skeleton.tip_ring,
-        "springs": [] if skeleton is None else skeleton.springs.tolist(),
+        "tip": module_count(nodes.shape[1]) if structure is None else structure.tip_ring,
+        "springs": [] if structure is None else structure.springs.tolist(),
         "cables": []
-        if skeleton is None
+        if structure is None
         else [
             {
                 "name": cable.name,
                 "nodes": cable.nodes.tolist(),
                 "weights": np.round(cable.weights, 6).tolist(),
             }
-            for cable in skeleton.cables
+            for cable in structure.cables
         ],
     }
 
 
 def _frames(history: History) -> NDArray[np.int64]:
-    """Rows of ``history.shape`` that are shown."""
+    """Return the rows of ``history.shape`` that are shown."""
     t = history.t[history.shape_step]
     wanted = int(FRAME_RATE_HZ * (t[-1] - t[0])) + 1
     return _every(len(t), min(MOST_FRAMES, max(wanted, 2)))
 
 
 def _grid(nodes: Array) -> tuple[Array, float]:
-    """Middle and step of a grid of 16-bit integers that holds all nodes."""
+    """Return the middle and step of a grid of 16-bit integers that holds all nodes."""
     low, high = nodes.min(axis=(0, 1)), nodes.max(axis=(0, 1))
     return (low + high) / 2.0, max(float(np.max(high - low)), 1e-6) / 65530.0
 
 
 def _every(count: int, most: int) -> NDArray[np.int64]:
-    """At most ``most`` of ``count`` rows, equally far apart, first and last among them."""
+    """Return at most ``most`` of ``count`` rows, equally far apart, first and last among them."""
     return np.unique(np.round(np.linspace(0, count - 1, min(count, most))).astype(np.int64))
 
 
 def _bundles(count: int) -> tuple[int, int]:
-    """Number of bundles and points in each, so that two per bundle are at most ``MOST_POINTS``."""
+    """Return the number of bundles and points in each, so that two per bundle are at most ``MOST_POINTS``."""
     size = -(-2 * count // MOST_POINTS)
     return count // size, size
 
@@ -181,7 +181,7 @@ def bundled(values: Array) -> Array:
 
 
 def bundled_times(t: Array) -> Array:
-    """Times (k,) of the points that :func:`bundled` keeps, taken in the first and the middle of every bundle."""
+    """Return times (k,) of the points that :func:`bundled` keeps: the first and the middle of every bundle."""
     if len(t) <= MOST_POINTS:
         return t
     count, size = _bundles(len(t))
@@ -190,7 +190,7 @@ def bundled_times(t: Array) -> Array:
 
 
 def bundled_marks(marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Marks (k,) of the points that :func:`bundled` keeps: set where any point of the bundle is marked."""
+    """Return marks (k,) of the points that :func:`bundled` keeps: set where any point of the bundle is marked."""
     if len(marks) <= MOST_POINTS:
         return marks
     count, size = _bundles(len(marks))

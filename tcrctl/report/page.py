@@ -49,7 +49,7 @@ def page(history: History, summary: Mapping[str, Any], payload: Mapping[str, Any
 
 
 def _safe_json(payload: Mapping[str, Any]) -> str:
-    """JSON that cannot end the script element it stands in."""
+    """Write JSON that cannot end the script element it stands in."""
     text = json.dumps(payload, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
@@ -69,10 +69,11 @@ def _reason(summary: Mapping[str, Any], history: History) -> str:
 
 
 def _cards(summary: Mapping[str, Any]) -> str:
-    """Every measure, with all its numbers."""
+    """Write every measure, with all its numbers."""
     cards = []
     for name in dict.fromkeys(full.partition(".")[0] for full in UNITS):
-        value, unit = summary.get(name), next(u for n, u in UNITS.items() if n.partition(".")[0] == name)
+        value = summary.get(name)
+        unit = next(u for n, u in UNITS.items() if n.partition(".")[0] == name)
         if value is None:
             continue
         title = name.removesuffix(f"_{unit.replace('/', '_')}".lower()) if unit else name
@@ -108,7 +109,7 @@ def _task(task: Any) -> str:
 
 
 def _nested(value: Any) -> str:
-    """Any JSON as nested tables."""
+    """Write any JSON as nested tables."""
     if isinstance(value, Mapping):
         rows = (f"<tr><th>{escape(str(k))}</th><td>{_nested(v)}</td></tr>" for k, v in value.items())
         return f"<table>{''.join(rows)}</table>"
@@ -132,7 +133,7 @@ def _pairs(values: Mapping[str, str]) -> str:
 
 
 def _attachments(history: History) -> str:
-    """Every attached file that is text."""
+    """Write every attached file that is text."""
     return "".join(
         f"<details><summary>{escape(name)}</summary><pre>{escape(text)}</pre></details>"
         for name, text in RunFiles(history.log).texts()

@@ -78,8 +78,8 @@ def _marks(marks: Sequence[Mark], places: Sequence[float], y: float) -> list[str
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """A few round values within a range."""
+    """Return a few round values within a range."""
     rough = ((high - low) or 1.0) / 6.0
     size = 10.0 ** math.floor(math.log10(rough))
-    step = next(m * size for m in (1.0, 2.0, 5.0, 10.0) if m * size >= rough)
-    return [round(k * step, 12) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    spacing = next(m * size for m in (1.0, 2.0, 5.0, 10.0) if m * size >= rough)
+    return [round(k * spacing, 12) for k in range(math.ceil(low / spacing), math.floor(high / spacing) + 1)]

@@ -58,7 +58,9 @@ def write_study_page(found: Findings, result: Done, folder: Path) -> Path:
 
 def study_page(found: Findings, result: Done, folder: Path) -> str:
     """Return the page as HTML."""
-    spec, asset, runs = found.spec, files(__package__), done(result.runs, result.rows)
+    spec = found.spec
+    asset = files(__package__)
+    runs = done(result.runs, result.rows)
     groups, *differences = found.tables()
     whole = result.missing == 0
     return Template(asset.joinpath("study.html").read_text("utf-8")).substitute(
@@ -82,7 +84,7 @@ def _table(table: TextTable) -> str:
 
 
 def _rows(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """Cells that are HTML already."""
+    """Return cells that are HTML already."""
     titles = "".join(f"<th>{title}</th>" for title in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><tr>{titles}</tr>{body}</table>"
@@ -129,7 +131,7 @@ def _runs(spec: StudySpec, runs: Sequence[Run], folder: Path) -> str:
 
 
 def _command(spec: StudySpec, run: PlannedRun, row: Row) -> str:
-    """What a person types to do a run again."""
+    """Return what a person types to do a run again."""
     settings = run.cell.changes(spec)
     if row.path:
         settings["trajectory"] = row.path["trajectory"]

@@ -128,7 +128,7 @@ def _through(path: Keys, route: FreeRoute, count: int) -> Iterator[Finding]:
 
 
 def _lengths_or_tensions(cables: CableSettings) -> Iterator[Finding]:
-    """Either every cable is given by a tension or every cable by a rest length."""
+    """Check that either every cable is given by a tension or every cable by a rest length."""
     by_length = any(route.rest_length_mm is not None for route in cables.routes)
     for i, route in enumerate(cables.routes):
         problem = _length_or_tension(route, by_length, cables.initial_tension_n)

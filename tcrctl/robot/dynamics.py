@@ -21,10 +21,10 @@ from tcrctl.robot.module import SIZE
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.signals import Array
 
-#: Largest nodal force left by a step [N]; the weight of one module is 0.1 N.
+#: Largest nodal force left by an internal step [N]; the weight of one module is 0.1 N.
 TOLERANCE = 1e-6
 MAX_ITERATIONS = 12
-#: A step is cut in half at most this often.
+#: An internal step is cut in half at most this often.
 MAX_HALVINGS = 8
 
 
@@ -52,16 +52,16 @@ class Rule(NamedTuple):
     """How time is integrated.
 
     Attributes:
-        step: Largest internal step [s].
+        h: Largest internal step [s].
         rho: Spectral radius of (15).
     """
 
-    step: float
+    h: float
     rho: float
 
 
 class Scratch(NamedTuple):
-    """Arrays of one step: predictors and the load of (*)."""
+    """Arrays of one internal step: predictors and the load of (*)."""
 
     q: Array
     q0: Array
@@ -75,12 +75,12 @@ class Scratch(NamedTuple):
 
 
 def rest_state(q: Array, drive: Array, slip: Slip | None = None) -> State:
-    """State at rest in configuration ``q`` with ``drive``; copies both."""
+    """Make the state at rest in configuration ``q`` with ``drive``; copies both."""
     return State(q.copy(), np.zeros_like(q), np.zeros_like(q), np.zeros_like(q), drive.copy(), slip)
 
 
 def unworn(model: Model, q: Array, drive: Array, tension: Array, holes: Array) -> Slip:
-    """Slip of cables that lie in their holes without any friction force: one tension along each.
+    """Return the slip of cables that lie in their holes without any friction force: one tension along each.
 
     Args:
         model: Robot arrays.
@@ -107,7 +107,7 @@ def unworn(model: Model, q: Array, drive: Array, tension: Array, holes: Array) -
 
 
 def lead_direction(q: Array) -> Array:
-    """Unit vector from the actuators to the base ring (3,): along the base's axis, towards the robot."""
+    """Return the unit vector from the actuators to the base ring (3,): along the base's axis, towards the robot."""
     r = q[:9].reshape(3, 3)
     up = np.cross(r[1] - r[0], r[2] - r[0])
     return np.asarray(-up / np.linalg.norm(up))
@@ -115,11 +115,20 @@ def lead_direction(q: Array) -> Array:
 
 def make_scratch(model: Model) -> Scratch:
     """Allocate the arrays for ``model``."""
-    size, bars, m = SIZE * (model.mass.shape[0] + 1), model.bars.shape[0], model.cables.shape[0]
+    size = SIZE * (model.mass.shape[0] + 1)
+    bars = model.bars.shape[0]
+    m = model.cables.shape[0]
     return Scratch(
-        np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(m), np.zeros((4, size)),
-        np.zeros(bars), np.zeros(bars), np.zeros(m), np.array([0.0, 0.0, -1.0]),
-    )  # fmt: skip
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(m),
+        np.zeros((4, size)),
+        np.zeros(bars),
+        np.zeros(bars),
+        np.zeros(m),
+        np.array([0.0, 0.0, -1.0]),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -145,7 +154,7 @@ def lengths_before(
 def _begin_slip(
     model: Model, q: Array, drive: Array, h: float, slip: Slip | None, s: Any, lead: Array
 ) -> None:
-    """Start a step of cables that rub."""
+    """Start an internal step of cables that rub."""
     if slip is not None:
         holes, weights = model.hole_nodes, model.hole_weights
         rubbing_cable.measure(q, drive, model.first_hole, holes, weights, model.cables, s)
@@ -154,7 +163,7 @@ def _begin_slip(
 
 @njit(cache=True, error_model="numpy")
 def _finish_slip(model: Model, slip: Slip | None, s: Any) -> None:
-    """End a step of cables that rub."""
+    """End an internal step of cables that rub."""
     if slip is not None:
         rubbing_cable.finish(slip, model.cables, model.first_hole, s)
 
@@ -163,7 +172,7 @@ def _finish_slip(model: Model, slip: Slip | None, s: Any) -> None:
 def try_step(
     model: Model, x: State, speed: Array, h: float, rho: float, external: Array, ws: Workspace, s: Scratch
 ) -> Outcome:
-    """One generalized-alpha step of size ``h`` [s]; changes ``x`` only if it converges."""
+    """Try one internal step of size ``h`` [s]; changes ``x`` only if it converges."""
     c = coefficients(rho, h)
     lengths_before(model, x.q, x.v, x.drive, speed, 0.5 * h, s, ws)
     _begin_slip(model, x.q, x.drive, h, x.slip, ws.stretches, s.lead)
@@ -209,7 +218,7 @@ def advance(
 
     Args:
         model: Robot arrays.
-        x: State; on failure it holds the last step that converged.
+        x: State; on failure it holds the last internal step that converged.
         speed: Drive speeds u (m,) [m/s].
         duration: Time to advance [s].
         rule: How time is integrated.
@@ -218,11 +227,15 @@ def advance(
         s: Scratch arrays.
 
     Returns:
-        (converged, residual [N], smallest step used [s], Newton iterations).
+        (converged, residual [N], smallest internal step [s], Newton iterations).
     """
-    step, done, residual, smallest, halvings, iterations = rule.step, 0.0, 0.0, rule.step, 0, 0
+    done = 0.0
+    residual = 0.0
+    smallest = rule.h
+    halvings = 0
+    iterations = 0
     while done < duration * (1.0 - 1e-9):
-        h = min(step / 2.0**halvings, duration - done)
+        h = min(rule.h / 2.0**halvings, duration - done)
         outcome = try_step(model, x, speed, h, rule.rho, external, ws, s)
         iterations += outcome.iterations
         residual = outcome.residual
@@ -233,5 +246,5 @@ def advance(
             halvings += 1
             if halvings > MAX_HALVINGS:
                 return False, residual, smallest, iterations
-            smallest = min(smallest, step / 2.0**halvings)
+            smallest = min(smallest, rule.h / 2.0**halvings)
     return True, residual, smallest, iterations

@@ -56,12 +56,12 @@ class Workspace(NamedTuple):
     Attributes:
         K: Block-banded part of the tangent (n_modules, w + 1, 12, 12) [N/m].
         U: Its Cholesky factor, same shape.
-        r: Residual of (*) for the free coordinates (12 n_modules,) [N].
+        r: Residual of (*) for the free coordinates (n_free,) [N].
         G: ∂l/∂q (m, 3 n_nodes); of groups of stretches where cables rub.
         tension: λ (m,) [N]; that at the drives where cables rub.
         axial: k_c = ∂λ/∂(l + d) of taut cables, 0 of slack ones (m,) [N/m].
         length: Path lengths l (m,) [m].
-        columns: Cable columns and right-hand side of ``linear.couple`` (12 n_modules, m + 1).
+        columns: Cable columns and right-hand side of ``linear.couple`` (n_free, m + 1).
         small: Its factor of the cable coupling (m, m).
         stretches: Of cables that rub; None without friction.
     """
@@ -141,12 +141,12 @@ def _add_bars(q: Array, nodes: np.ndarray, bars: Array, w: float, before: Array,
 
 
 @njit(cache=True, error_model="numpy")
-def _pull(r: Array, nodes: np.ndarray, weights: Array, h: int, T: float, e: Array) -> None:
-    """Add tension T along e, the direction of the stretch before, at hole ``h`` to the residual."""
+def _pull(r: Array, nodes: np.ndarray, weights: Array, hole: int, T: float, e: Array) -> None:
+    """Add tension T along e, the direction of the stretch before, at ``hole`` to the residual."""
     for i in range(3):
-        f = T * weights[h, i]
+        f = T * weights[hole, i]
         if f != 0.0:
-            _add_force(r, nodes[h, i], f * e[0], f * e[1], f * e[2])
+            _add_force(r, nodes[hole, i], f * e[0], f * e[1], f * e[2])
 
 
 @njit(cache=True, error_model="numpy")
@@ -154,18 +154,18 @@ def _group_row(model: Model, s: Stretches, start: int, end: int, row: Array) -> 
     """Fill ``row`` (3 n_nodes,) with the gradient of the length of stretches ``start`` .. ``end``."""
     for k in range(row.shape[0]):
         row[k] = 0.0
-    for h in range(start, end + 1):
+    for stretch in range(start, end + 1):
         for side in range(2):
-            sign, hole = 2.0 * side - 1.0, h - 1 + side
+            sign, hole = 2.0 * side - 1.0, stretch - 1 + side
             for i in range(3):
                 f, node = sign * model.hole_weights[hole, i], 3 * model.hole_nodes[hole, i]
                 for a in range(3):
-                    row[node + a] += f * s.direction[h, a]
+                    row[node + a] += f * s.direction[stretch, a]
 
 
 @njit(cache=True, error_model="numpy")
 def _add_groups(model: Model, c: int, ws: Workspace, s: Stretches) -> None:
-    """Stiffness of the groups of cable ``c``: one stretch goes into the banded part, several share a row."""
+    """Add the groups of cable ``c``: one stretch goes into the banded part, several share a row."""
     first, end = model.first_hole[c], model.first_hole[c + 1] - 1
     while end > first:
         start = rubbing_cable.group_start(s, first, end)
@@ -189,11 +189,11 @@ def _add_rubbing(model: Model, q: Array, drive: Array, slip: Slip, s: Stretches,
     s.groups[0] = 0
     for c in range(drive.shape[0]):
         ws.tension[c], ws.length[c] = s.tension[first[c]], cables[c, sliding_cable.LEAD]
-        for h in range(first[c] + 1, first[c + 1]):
-            ws.length[c] += s.length[h]
-            s.axial[h] = 0.0
-            _pull(ws.r, model.hole_nodes, model.hole_weights, h, s.tension[h], s.direction[h])
-            _pull(ws.r, model.hole_nodes, model.hole_weights, h - 1, -s.tension[h], s.direction[h])
+        for hole in range(first[c] + 1, first[c + 1]):
+            ws.length[c] += s.length[hole]
+            s.axial[hole] = 0.0
+            _pull(ws.r, model.hole_nodes, model.hole_weights, hole, s.tension[hole], s.direction[hole])
+            _pull(ws.r, model.hole_nodes, model.hole_weights, hole - 1, -s.tension[hole], s.direction[hole])
         _add_groups(model, c, ws, s)
     return energy
 

@@ -35,7 +35,7 @@ class Equilibrium(NamedTuple):
         q: Node positions (3 n_nodes,) [m].
         tension: Cable tensions λ (m,) [N].
         length: Path lengths (m,) [m].
-        gain: ∂q/∂d, static response of the free coordinates to the drives (12 n_modules, m).
+        gain: ∂q/∂d, static response of the free coordinates to the drives (n_free, m).
         iterations: Newton iterations of the last solve.
         residual: Largest nodal force left [N].
     """
@@ -49,7 +49,7 @@ class Equilibrium(NamedTuple):
 
 
 def static_load(model: Model, external: Array) -> Load:
-    """Load of statics: no inertia, no damping, external force (3 n_nodes,) [N] with gravity in it."""
+    """Return the load of statics: no inertia, no damping, external force (3 n_nodes,) [N] with gravity in it."""
     nodal = np.zeros((4, external.shape[0]))
     nodal[FORCE] = external
     return Load(0.0, 0.0, nodal, np.zeros(model.bars.shape[0]), np.zeros(model.cables.shape[0]), None)
@@ -75,7 +75,7 @@ def _in_steps(
 def equilibrium(
     model: Model, drive: Array, external: Array, start: Array, start_drive: Array | None = None
 ) -> Equilibrium:
-    """Equilibrium for prescribed drive lengths.
+    """Find the equilibrium for prescribed drive lengths.
 
     Args:
         model: Robot arrays.
@@ -114,7 +114,7 @@ def with_rest_lengths(model: Model, rest: Array) -> Model:
 
 
 def equilibrium_with_tensions(model: Model, tension: Array, external: Array, start: Array) -> Equilibrium:
-    """Equilibrium for prescribed cable tensions (m,) [N], as of cables pulled by constant forces.
+    """Find the equilibrium for prescribed cable tensions (m,) [N], as of cables pulled by constant forces.
 
     Every cable is replaced by a soft one with the rest length that gives it the wanted tension at the present
     length; the exchange is repeated until the tensions are met. ``gain`` belongs to the soft cables.

@@ -27,7 +27,7 @@ SHIFT_GROWTH = 30.0
 
 @njit(cache=True, error_model="numpy")
 def _copy(K: Array, U: Array) -> None:
-    """U = K in plain loops, which compile in a tenth of the time of a slice assignment."""
+    """Set U = K in plain loops, which compile in a tenth of the time of a slice assignment."""
     for j in range(K.shape[0]):
         for d in range(K.shape[1]):
             for a in range(K.shape[2]):
@@ -68,7 +68,7 @@ def factor_shifted(K: Array, U: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def in_use(ws: Workspace, stretches: Stretches | None) -> Workspace:
-    """``ws`` with as many rank-1 rows as are in use: cables, or groups of stretches of cables that rub."""
+    """Return ``ws`` with as many rank-1 rows as are in use: cables, or groups of stretches of cables that rub."""
     if stretches is None:
         return ws
     r, size = stretches.groups[0], ws.r.shape[0]
@@ -103,8 +103,10 @@ def couple(ws: Workspace, b: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _finish(ws: Workspace, X: Array) -> None:
-    """Overwrite X (12 n_modules, r) by U^-1 (I - W P^-1 W') X."""
-    m, size, r = ws.axial.shape[0], X.shape[0], X.shape[1]
+    """Overwrite X (n_free, r) by U^-1 (I - W P^-1 W') X."""
+    m = ws.axial.shape[0]
+    size = X.shape[0]
+    r = X.shape[1]
     weight = np.zeros((m, r))
     for k in range(size):
         for c in range(m):
@@ -125,8 +127,8 @@ def solve(ws: Workspace, b: Array, x: Array) -> None:
 
     Args:
         ws: U, G and axial stiffness at one configuration.
-        b: Right-hand side (12 n_modules,).
-        x: Output (12 n_modules,).
+        b: Right-hand side (n_free,).
+        x: Output (n_free,).
     """
     couple(ws, b)
     m = ws.axial.shape[0]
@@ -140,18 +142,18 @@ def solve(ws: Workspace, b: Array, x: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def solve_many(ws: Workspace, X: Array) -> None:
-    """Overwrite columns X (12 n_modules, r) by A^-1 X; ``columns`` and ``small`` as :func:`couple` left them."""
+    """Overwrite columns X (n_free, r) by A^-1 X; ``columns`` and ``small`` as :func:`couple` left them."""
     block_banded.solve_forward(ws.U, X)
     _finish(ws, X)
 
 
 @njit(cache=True, error_model="numpy")
 def drive_gain(ws: Workspace, gain: Array) -> None:
-    """∂q/∂d = -A^-1 G' C at the configuration in ``ws``.
+    """Fill ∂q/∂d = -A^-1 G' C at the configuration in ``ws``.
 
     Args:
         ws: U, G and axial stiffness; ``columns`` and ``small`` as :func:`couple` left them.
-        gain: Output (12 n_modules, m); the sensitivity of the free coordinates to the drives.
+        gain: Output (n_free, m); the sensitivity of the free coordinates to the drives.
     """
     m = ws.axial.shape[0]
     for c in range(m):
@@ -163,7 +165,7 @@ def drive_gain(ws: Workspace, gain: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def tension_gain(ws: Workspace, gain: Array) -> Array:
-    """∂λ/∂d = C (I + G ∂q/∂d) (m, m) [N/m] for the ``gain`` of :func:`drive_gain`."""
+    """Return ∂λ/∂d = C (I + G ∂q/∂d) (m, m) [N/m] for the ``gain`` of :func:`drive_gain`."""
     m = ws.axial.shape[0]
     out = np.zeros((m, m))
     for c in range(m):

@@ -40,7 +40,7 @@ class Model(NamedTuple):
         bar_nodes: End nodes of rods, ring sides and springs (n_bars, 2).
         bars: Their parameters (n_bars, 4), columns as in elements.bar.
         first_hole: Holes of cable c are first_hole[c] .. first_hole[c + 1] - 1 (m + 1,).
-        hole_nodes: Ring nodes that carry hole h (n_holes, 3).
+        hole_nodes: Ring nodes that carry each hole (n_holes, 3).
         hole_weights: Their weights (n_holes, 3), see elements.torus.
         cables: Cable parameters (m, 4), columns as in elements.sliding_cable.
     """
@@ -57,7 +57,7 @@ class Model(NamedTuple):
 
 
 def _mass_matrix(d: RobotDescription) -> Array:
-    """(n_modules, 12, 12): ring by (4), rods consistent, springs lumped on their end nodes [kg]."""
+    """Return (n_modules, 12, 12): ring by (4), rods consistent, springs lumped on their end nodes [kg]."""
     blocks = np.stack([mass_block(d.modules.of(module)) for module in range(d.modules.count + 1)])
     for spring in spring_list(d):
         for node in (node_index(name) for name in spring.nodes):
@@ -85,8 +85,10 @@ def _bars(d: RobotDescription, nodes: Array) -> tuple[NDArray[np.int64], Array]:
 
 
 def _holes(d: RobotDescription) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """first_hole, hole_nodes, hole_weights of all routes."""
-    nodes, weights, first = [], [], [0]
+    """Return first_hole, hole_nodes and hole_weights of all routes."""
+    nodes = []
+    weights = []
+    first = [0]
     for route in cable_routes(d):
         for ring, angle in route.holes:
             nodes.append(ring_nodes(ring))
@@ -96,7 +98,7 @@ def _holes(d: RobotDescription) -> tuple[NDArray[np.int64], NDArray[np.int64], A
 
 
 def _bandwidth(bars: NDArray[np.int64], hole_nodes: NDArray[np.int64], first: NDArray[np.int64]) -> int:
-    """Largest distance in modules between two coupled free modules; at least 1."""
+    """Return the largest distance in modules between two coupled free modules; at least 1."""
     widths = [1]
     for i, j in module_of(bars):
         if i > 0 and j > 0:
@@ -119,14 +121,14 @@ def freeze(model: Model) -> Model:
 
 
 def undeformed(d: RobotDescription) -> Array:
-    """Node positions of the straight stack (3 n_nodes,) [m], where no rod is stretched, hung from its base."""
+    """Return nodes of the straight stack (3 n_nodes,) [m], where no rod is stretched, hung from its base."""
     nodes = straight_stack(d.modules)
     hung: Array = nodes @ _tilt(d).T if any(d.base.tilt_deg) else nodes
     return hung.ravel()
 
 
 def _tilt(d: RobotDescription) -> Array:
-    """Rotation of the base (3, 3): about x, then about y."""
+    """Return the rotation of the base (3, 3): about x, then about y."""
     x, y = np.radians(d.base.tilt_deg)
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, math.cos(x), -math.sin(x)], [0.0, math.sin(x), math.cos(x)]])
     about_y = np.array([[math.cos(y), 0.0, math.sin(y)], [0.0, 1.0, 0.0], [-math.sin(y), 0.0, math.cos(y)]])
@@ -134,7 +136,7 @@ def _tilt(d: RobotDescription) -> Array:
 
 
 def gravity_force(model: Model, gravity: Array) -> Array:
-    """Weight of every node coordinate (3 n_nodes,) [N] for gravity (3,) [m/s2]; zero on the base."""
+    """Return the weight of every node coordinate (3 n_nodes,) [N] for gravity (3,) [m/s2]; zero on the base."""
     force = np.zeros(SIZE * (model.mass.shape[0] + 1))
     for i, block in enumerate(model.mass):
         force[SIZE * (i + 1) : SIZE * (i + 2)] = block @ np.tile(gravity, NODES)
@@ -142,12 +144,13 @@ def gravity_force(model: Model, gravity: Array) -> Array:
 
 
 def build_model(d: RobotDescription, cable_rest: Array) -> Model:
-    """Kernel arrays of the robot described by ``d`` with cable rest lengths (m,) [m], lead included."""
+    """Make the kernel arrays of the robot described by ``d`` with cable rest lengths (m,) [m], lead included."""
     first_hole, hole_nodes, hole_weights = _holes(d)
     bar_nodes, bars = _bars(d, straight_stack(d.modules))
     routes = cable_routes(d)
     ea = np.array([route.axial_stiffness for route in routes])
-    damping, lead = np.array([route.damping for route in routes]), np.array([route.lead for route in routes])
+    damping = np.array([route.damping for route in routes])
+    lead = np.array([route.lead for route in routes])
     return freeze(
         Model(
             mass=_mass_matrix(d),
@@ -164,7 +167,7 @@ def build_model(d: RobotDescription, cable_rest: Array) -> Model:
 
 
 def scaled(model: Model, springs: float = 1.0, cables: float = 1.0, density: float = 1.0) -> Model:
-    """Twin of ``model`` with factors on spring and cable moduli and on all masses; rest lengths unchanged."""
+    """Return a twin of ``model`` with factors on moduli of springs and cables and on masses; same rest lengths."""
     bars, strings = model.bars.copy(), model.cables.copy()
     bars[RIGID_BARS * model.mass.shape[0] :, bar.STIFFNESS] *= springs
     strings[:, sliding_cable.STIFFNESS] *= cables
@@ -172,7 +175,7 @@ def scaled(model: Model, springs: float = 1.0, cables: float = 1.0, density: flo
 
 
 def with_load(model: Model, ring: int, mass: float) -> Model:
-    """Twin of ``model`` whose ring with first node row ``ring`` carries ``mass`` [kg], a third on each node."""
+    """Return a twin of ``model`` whose ring from node row ``ring`` on carries ``mass`` [kg], a third per node."""
     blocks = model.mass.copy()
     load = blocks[module_of(ring) - 1]
     load[np.arange(3 * RING), np.arange(3 * RING)] += mass / 3.0

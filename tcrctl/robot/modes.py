@@ -23,7 +23,7 @@ class Modes(NamedTuple):
 
     Attributes:
         frequency: Natural frequencies (count,) [Hz].
-        shape: Mode shapes over the free coordinates, V'MV = I (12 n_modules, count) [1/sqrt(kg)].
+        shape: Mode shapes over the free coordinates, V'MV = I (n_free, count) [1/sqrt(kg)].
     """
 
     frequency: Array
@@ -31,7 +31,7 @@ class Modes(NamedTuple):
 
 
 def mass_matrix(model: Model) -> Array:
-    """Dense mass matrix of the free coordinates (12 n_modules, 12 n_modules) [kg]."""
+    """Return the dense mass matrix of the free coordinates (n_free, n_free) [kg]."""
     from scipy.linalg import block_diag
 
     M: Array = block_diag(*model.mass)
@@ -39,14 +39,14 @@ def mass_matrix(model: Model) -> Array:
 
 
 def modes(model: Model, equilibrium: Equilibrium, drive: Array, external: Array, count: int) -> Modes:
-    """Lowest modes about a stable equilibrium.
+    """Return the lowest modes about a stable equilibrium.
 
     Args:
         model: Robot arrays.
         equilibrium: Static equilibrium of the model.
         drive: Drive lengths that belong to it (m,) [m].
         external: External force that belongs to it, gravity included (3 n_nodes,) [N].
-        count: Number of modes wanted, at most 12 n_modules.
+        count: Number of modes wanted, at most n_free.
     """
     from scipy.linalg import eigh
 

@@ -180,7 +180,7 @@ def straight_stack(modules: ModuleSettings) -> Array:
 
 
 def _depth(modules: ModuleSettings, module: int) -> float:
-    """Distance of a ring plane of the straight stack below the base [m]."""
+    """Return the distance of a ring plane of the straight stack below the base [m]."""
     pitch = modules.pitch_mm / 1000.0
     return module * pitch + math.fsum(modules.of(i).pitch_mm / 1000.0 - pitch for i in range(1, module + 1))
 

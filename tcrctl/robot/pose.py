@@ -11,7 +11,7 @@ from tcrctl.signals import Array
 
 @njit(cache=True, error_model="numpy")
 def position(q: Array, ring: int) -> Array:
-    """Centroid (3,) [m] of the ring whose first node is row ``ring`` of ``q`` (3 n_nodes,)."""
+    """Return the centroid (3,) [m] of the ring whose first node is row ``ring`` of ``q`` (3 n_nodes,)."""
     y = np.zeros(3)
     for node in range(ring, ring + 3):
         for a in range(3):
@@ -21,7 +21,7 @@ def position(q: Array, ring: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def _area_vector(q: Array, ring: int) -> Array:
-    """(r2 - r1) x (r3 - r2) (3,) [m2]: +z at rest for nodes counter-clockwise seen from +z."""
+    """Return (r2 - r1) x (r3 - r2) (3,) [m2]: +z at rest for nodes counter-clockwise seen from +z."""
     a, b, c = 3 * ring, 3 * ring + 3, 3 * ring + 6
     d = np.empty(3)
     for k in range(3):
@@ -32,7 +32,7 @@ def _area_vector(q: Array, ring: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def normal(q: Array, ring: int) -> Array:
-    """Unit normal (3,) of the ring, +z at rest (REFERENCES.md, correction 6)."""
+    """Return the unit normal (3,) of the ring, +z at rest (REFERENCES.md, correction 6)."""
     d = _area_vector(q, ring)
     size = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     n: Array = d / size
@@ -41,7 +41,7 @@ def normal(q: Array, ring: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def twist(q: Array, ring: int) -> float:
-    """Rotation [rad] of the ring about its normal against the shortest rotation from rest (node 1 on +x)."""
+    """Return rotation [rad] of the ring about its normal against the shortest rotation from rest (node 1 on +x)."""
     n, y = normal(q, ring), position(q, ring)
     arm, ahead = np.empty(3), np.empty(3)
     for a in range(3):
@@ -59,7 +59,7 @@ def twist(q: Array, ring: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def output_matrix(q: Array, ring: int) -> Array:
-    """Derivatives (7, 9) of position, normal and twist with respect to the ring's nine coordinates.
+    """Return derivatives (7, 9) of position, normal and twist with respect to the ring's nine coordinates.
 
     Rows 0-2: ∂y/∂q = I/3 per node. Rows 3-5: with d = Σ_k r_k x r_{k+1} (twice the area vector's value for a
     triangle), δn = (I - n n') δd / |d|. Row 6: rotation about the normal, the mean of the nodes' tangential
@@ -95,11 +95,11 @@ def output_matrix(q: Array, ring: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def drive_gain(q: Array, gain: Array, ring: int) -> Array:
-    """Derivatives (7, m) of position, normal and twist of a ring by the drives.
+    """Return derivatives (7, m) of position, normal and twist of a ring by the drives.
 
     Args:
         q: Node positions (3 n_nodes,) [m].
-        gain: Derivatives of the free coordinates by the drives (12 n_modules, m).
+        gain: Derivatives of the free coordinates by the drives (n_free, m).
         ring: Row of the ring's first node, not that of the base.
     """
     first = 3 * (ring - FIXED)

@@ -45,7 +45,7 @@ class Outcome(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _largest(x: Array) -> float:
-    """Largest magnitude in x; NaN if there is one."""
+    """Return the largest magnitude in x; NaN if there is one."""
     out = 0.0
     for value in x:
         if not abs(value) <= out:
@@ -57,7 +57,7 @@ def _largest(x: Array) -> float:
 def _search(
     model: Model, q: Array, drive: Array, load: Load, ws: Workspace, p: Array, start: float
 ) -> tuple[bool, float]:
-    """Move ``q`` along ``p`` (12 n_modules,) until Armijo's rule holds; returns (found, potential there)."""
+    """Move ``q`` along ``p`` (n_free,) until Armijo's rule holds; returns (found, potential there)."""
     slope = 0.0
     for i in range(p.shape[0]):
         slope += ws.r[i] * p[i]
@@ -104,7 +104,9 @@ def minimise(
     Returns:
         An :class:`Outcome`.
     """
-    shift, largest, iteration = 0.0, np.inf, 0
+    shift = 0.0
+    largest = np.inf
+    iteration = 0
     p = np.empty(ws.r.shape[0])
     energy = residual(model, q, drive, load, ws)
     for iteration in range(limit + 1):

@@ -51,7 +51,7 @@ class Release(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def mass_columns(mass: Array, X: Array, out: Array) -> None:
-    """out = M X for columns X (12 n_modules, r)."""
+    """Set out = M X for columns X (n_free, r)."""
     for k in range(X.shape[0]):
         i, a = k // SIZE, k % SIZE
         for c in range(X.shape[1]):
@@ -65,7 +65,7 @@ def mass_columns(mass: Array, X: Array, out: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _orthonormalise(mass: Array, V: Array, MV: Array) -> None:
-    """Gram-Schmidt in the mass inner product on the columns of V (12 n_modules, r); fills MV = M V.
+    """Orthonormalise the columns of V (n_free, r) in the mass inner product (Gram-Schmidt); fills MV = M V.
 
     Dependent columns become zero. Rows of the transposed copies are vectors, so that inner loops are contiguous.
     """
@@ -94,12 +94,12 @@ def _orthonormalise(mass: Array, V: Array, MV: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def refine_basis(model: Model, ws: Workspace, V: Array) -> None:
-    """One orthogonal iteration of the modes in V; its last m columns become the static answers to the drives.
+    """Iterate the modes in V once; its last m columns become the static answers to the drives.
 
     Args:
         model: Robot arrays.
         ws: K, U, G at a stable equilibrium, with :func:`tcrctl.robot.linear.couple` done.
-        V: Basis (12 n_modules, modes + m), changed.
+        V: Basis (n_free, modes + m), changed.
     """
     m, size = ws.axial.shape[0], V.shape[0]
     MV = np.empty(V.shape)
@@ -114,7 +114,7 @@ def refine_basis(model: Model, ws: Workspace, V: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _project(ws: Workspace, V: Array, GV: Array) -> Array:
-    """Reduced stiffness V'AV (r, r); fills GV = G V (m, r)."""
+    """Return the reduced stiffness V'AV (r, r); fills GV = G V (m, r)."""
     size, r = V.shape
     KV = np.empty((size, r))
     block_banded.multiply_columns(ws.K, V, KV)
@@ -140,7 +140,7 @@ def _project(ws: Workspace, V: Array, GV: Array) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def _stage(U: Array, a: float, b: float, t: float, x: Array, v: Array, F: Array, X: Array) -> None:
-    """X = (a I + V'AV)^-1 (a x + b v + t F): reduced positions of one stage from its explicit parts x, v."""
+    """Set X = (a I + V'AV)^-1 (a x + b v + t F): reduced positions of a stage from its explicit parts x, v."""
     for i in range(X.shape[0]):
         for c in range(X.shape[1]):
             X[i, c] = a * x[i, c] + b * v[i, c] + t * F[i, c]
@@ -150,7 +150,7 @@ def _stage(U: Array, a: float, b: float, t: float, x: Array, v: Array, F: Array,
 
 @njit(cache=True, error_model="numpy")
 def _observe(CV: Array, GV: Array, axial: Array, t: float, x: Array, out: Array) -> None:
-    """out (7 + m, m + 1) = end pose and tension changes that belong to reduced positions x (r, m + 1)."""
+    """Fill out (7 + m, m + 1), end pose and tension changes of reduced positions x (r, m + 1)."""
     m = axial.shape[0]
     out[:POSE_ROWS] = np.dot(CV, x)
     out[POSE_ROWS:] = np.dot(GV, x)
@@ -179,20 +179,22 @@ def respond(
         ahead: Times of the responses after it, equally spaced from 0 (steps,) [s].
         tip: Row of the first node of the tip ring.
         ws: Workspace of the static solve that found ``q_eq``.
-        V: Basis (12 n_modules, modes + m), refined by this call; see :func:`start_basis`.
+        V: Basis (n_free, modes + m), refined by this call; see :func:`start_basis`.
 
     Returns:
         change (steps, 7 + m, m + 1) of position [m], normal, twist [rad] and tensions [N] since the state:
         column c for a unit ramp of drive c (1 m/s), column m for the free motion; and whether the reduced
         tangent was positive definite.
     """
-    m, r, first = model.cables.shape[0], V.shape[1], 3 * (tip - FIXED)
-    step, steps = ahead[0], ahead.shape[0]
+    m = model.cables.shape[0]
+    r = V.shape[1]
+    first = 3 * (tip - FIXED)
+    h, steps = ahead[0], ahead.shape[0]
     for c in range(m):
         ws.axial[c] = model.cables[c, STIFFNESS]
     linear.couple(ws, ws.r)
     refine_basis(model, ws, V)
-    GV, b = np.empty((m, r)), 1.0 / (GAMMA * step)
+    GV, b = np.empty((m, r)), 1.0 / (GAMMA * h)
     reduced = _project(ws, V, GV)
     a = b * b + model.damping * b
     for i in range(r):
@@ -200,7 +202,8 @@ def respond(
     CV = np.dot(pose.output_matrix(q_eq, tip), V[first : first + 9])
     x, vx, F = np.zeros((r, m + 1)), np.zeros((r, m + 1)), np.zeros((r, m + 1))
     stage1, stage2 = np.empty((r, m + 1)), np.empty((r, m + 1))
-    start, change = np.zeros((POSE_ROWS + m, m + 1)), np.zeros((steps, POSE_ROWS + m, m + 1))
+    start = np.zeros((POSE_ROWS + m, m + 1))
+    change = np.zeros((steps, POSE_ROWS + m, m + 1))
     if not block_banded.factor_diagonal(reduced):
         return change, False
     _project_state(model.mass, V, release.offset, release.v, x, vx)
@@ -209,26 +212,26 @@ def respond(
             F[i, c] = -ws.axial[c] * GV[c, i]
     _observe(CV, GV, ws.axial, 0.0, x, start)
     for n in range(steps):
-        t = n * step
-        _stage(reduced, a, b, t + GAMMA * step, x, vx, F, stage1)
+        t = n * h
+        _stage(reduced, a, b, t + GAMMA * h, x, vx, F, stage1)
         for i in range(r):
             for c in range(m + 1):
                 v1 = b * (stage1[i, c] - x[i, c])
-                x[i, c] += (1.0 - GAMMA) * step * v1
-                vx[i, c] += (1.0 - GAMMA) * step * b * (v1 - vx[i, c])
-        _stage(reduced, a, b, t + step, x, vx, F, stage2)
+                x[i, c] += (1.0 - GAMMA) * h * v1
+                vx[i, c] += (1.0 - GAMMA) * h * b * (v1 - vx[i, c])
+        _stage(reduced, a, b, t + h, x, vx, F, stage2)
         for i in range(r):
             for c in range(m + 1):
                 vx[i, c] = b * (stage2[i, c] - x[i, c])
                 x[i, c] = stage2[i, c]
-        _observe(CV, GV, ws.axial, t + step, x, change[n])
+        _observe(CV, GV, ws.axial, t + h, x, change[n])
         change[n] -= start
     return change, True
 
 
 @njit(cache=True, error_model="numpy")
 def _project_state(mass: Array, V: Array, offset: Array, v: Array, x: Array, vx: Array) -> None:
-    """Last columns of x, vx (r, m + 1) = V'M offset, V'M v: the part of the state that the basis can show."""
+    """Set last columns of x, vx (r, m + 1) to V'M offset, V'M v: the part of the state that the basis shows."""
     size, last = V.shape[0], x.shape[1] - 1
     state, weighted = np.empty((size, 2)), np.empty((size, 2))
     for k in range(size):
@@ -241,7 +244,7 @@ def _project_state(mass: Array, V: Array, offset: Array, v: Array, x: Array, vx:
 
 
 def start_basis(model: Model, ws: Workspace, modes: int, iterations: int = 30) -> Array:
-    """Basis (12 n_modules, modes + m) at the stable equilibrium that ``ws`` (K, U, G) belongs to.
+    """Return the basis (n_free, modes + m) at the stable equilibrium that ``ws`` (K, U, G) belongs to.
 
     Starts from a fixed pseudo-random block; 30 orthogonal iterations separate modes a factor 2 apart in
     frequency to 1e-18.

@@ -49,7 +49,7 @@ class Robot:
     holes: Array | None = None
 
     def __deepcopy__(self, memo: dict[int, object]) -> Robot:
-        """Itself: nothing in it ever changes, and the kernels know its arrays as read-only."""
+        """Return itself: nothing in it ever changes, and the kernels know its arrays as read-only."""
         del memo
         return self
 
@@ -80,9 +80,14 @@ def _strung(d: RobotDescription, start: Array) -> tuple[Model, Array, Equilibriu
     no_tension = build_model(d, np.ones(len(routes)))
     length, gradient = np.zeros(len(routes)), np.zeros((len(routes), start.shape[0]))
     sliding_cable.path_gradients(
-        start, no_tension.first_hole, no_tension.hole_nodes, no_tension.hole_weights, no_tension.cables,
-        length, gradient,
-    )  # fmt: skip
+        start,
+        no_tension.first_hole,
+        no_tension.hole_nodes,
+        no_tension.hole_weights,
+        no_tension.cables,
+        length,
+        gradient,
+    )
     model = build_model(d, length)
     weight = gravity_force(model, np.array(d.gravity_m_s2, dtype=float))
     given = np.array([np.nan if r.rest_length is None else r.rest_length for r in routes])
@@ -119,7 +124,7 @@ def build_robot(description: RobotDescription) -> Robot:
 
 
 def hole_friction(friction: FrictionSettings, first_hole: NDArray[np.int64]) -> Array:
-    """Friction of every hole (n_holes, 3), read-only, columns as in ``elements.rubbing_cable``.
+    """Return the friction of every hole (n_holes, 3), read-only, columns as in ``elements.rubbing_cable``.
 
     Args:
         friction: Common to all holes, or with a coefficient per cable.
@@ -135,7 +140,7 @@ def hole_friction(friction: FrictionSettings, first_hole: NDArray[np.int64]) -> 
 
 
 def retensioned(robot: Robot, factors: Array) -> Robot:
-    """The same robot strung otherwise: every cable has its tension at zero drive times a factor (m,).
+    """Return the same robot strung otherwise: every cable has its tension at zero drive times a factor (m,).
 
     Raises:
         NoEquilibriumError: If that robot has no stable shape at zero drive.
@@ -151,7 +156,7 @@ def retensioned(robot: Robot, factors: Array) -> Robot:
 def mismatched(
     robot: Robot, springs: float = 1.0, cables: float = 1.0, density: float = 1.0, tip_load: float = 0.0
 ) -> Robot:
-    """The same robot of other material: factors on moduli and masses, same rest lengths, own rest shape.
+    """Return the same robot of other material: factors on moduli and masses, same rest lengths, own rest shape.
 
     Args:
         robot: The robot as described.

@@ -36,7 +36,7 @@ class StaticMap(NamedTuple):
     Attributes:
         equilibrium: q_eq (3 n_nodes,) [m].
         drive: Drives it belongs to (m,) [m].
-        gain: ∂q_eq/∂d (12 n_modules, m).
+        gain: ∂q_eq/∂d (n_free, m).
     """
 
     equilibrium: Array

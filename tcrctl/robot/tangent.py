@@ -80,13 +80,15 @@ def add_bars(K: Array, q: Array, nodes: np.ndarray, bars: Array, w: float, befor
 
 
 @njit(cache=True, error_model="numpy")
-def _add_holes(K: Array, nodes: np.ndarray, weights: Array, h: int, k: int, f: float, s: Array) -> None:
-    """Add f s between holes h and k, spread on the ring nodes that carry them."""
+def _add_holes(
+    K: Array, nodes: np.ndarray, weights: Array, hole: int, other: int, f: float, s: Array
+) -> None:
+    """Add f s between the two holes, spread on the ring nodes that carry them."""
     for a in range(3):
-        if weights[h, a] != 0.0:
-            for b in range(a if h == k else 0, 3):
-                if weights[k, b] != 0.0:
-                    _add_pair(K, nodes[h, a], nodes[k, b], f * weights[h, a] * weights[k, b], s)
+        if weights[hole, a] != 0.0:
+            for b in range(a if hole == other else 0, 3):
+                if weights[other, b] != 0.0:
+                    _add_pair(K, nodes[hole, a], nodes[other, b], f * weights[hole, a] * weights[other, b], s)
 
 
 @njit(cache=True, error_model="numpy")
@@ -97,12 +99,12 @@ def add_cables(
     s = np.empty(6)
     for c in range(tension.shape[0]):
         if tension[c] > 0.0:
-            for h in range(first_hole[c], first_hole[c + 1] - 1):
-                length, ex, ey, ez = sliding_cable.segment(q, nodes, weights, h)
+            for hole in range(first_hole[c], first_hole[c + 1] - 1):
+                length, ex, ey, ez = sliding_cable.segment(q, nodes, weights, hole)
                 _fill_line(s, 0.0, tension[c] / length, ex, ey, ez)
-                _add_holes(K, nodes, weights, h, h, 1.0, s)
-                _add_holes(K, nodes, weights, h + 1, h + 1, 1.0, s)
-                _add_holes(K, nodes, weights, h, h + 1, -1.0, s)
+                _add_holes(K, nodes, weights, hole, hole, 1.0, s)
+                _add_holes(K, nodes, weights, hole + 1, hole + 1, 1.0, s)
+                _add_holes(K, nodes, weights, hole, hole + 1, -1.0, s)
 
 
 @njit(cache=True, error_model="numpy")
@@ -110,12 +112,12 @@ def add_stretches(K: Array, first_hole: np.ndarray, nodes: np.ndarray, weights: 
     """Add every stretch of cables that rub: its tension across, and along it the stiffness of a group of one."""
     block = np.empty(6)
     for c in range(first_hole.shape[0] - 1):
-        for h in range(first_hole[c] + 1, first_hole[c + 1]):
-            lateral = s.tension[h] / s.length[h]
-            if lateral == 0.0 and s.axial[h] == 0.0:
+        for hole in range(first_hole[c] + 1, first_hole[c + 1]):
+            lateral = s.tension[hole] / s.length[hole]
+            if lateral == 0.0 and s.axial[hole] == 0.0:
                 continue
-            ex, ey, ez = s.direction[h, 0], s.direction[h, 1], s.direction[h, 2]
-            _fill_line(block, s.axial[h], lateral, ex, ey, ez)
-            _add_holes(K, nodes, weights, h - 1, h - 1, 1.0, block)
-            _add_holes(K, nodes, weights, h, h, 1.0, block)
-            _add_holes(K, nodes, weights, h - 1, h, -1.0, block)
+            ex, ey, ez = s.direction[hole, 0], s.direction[hole, 1], s.direction[hole, 2]
+            _fill_line(block, s.axial[hole], lateral, ex, ey, ez)
+            _add_holes(K, nodes, weights, hole - 1, hole - 1, 1.0, block)
+            _add_holes(K, nodes, weights, hole, hole, 1.0, block)
+            _add_holes(K, nodes, weights, hole - 1, hole, -1.0, block)

@@ -32,9 +32,9 @@ from tcrctl.stability.report import StabilityPoint, StabilityReport
 #: Length of a deviation of the loop's state, in the scales of its parts: some tens of micrometres per coordinate.
 #: At standstill the solvers of plant and estimator accept what they have until it is off by their tolerance; with
 #: smaller or one-sided differences such a jump would pass for a slope.
-STEP: Final = 1.0
+DEVIATION: Final = 1.0
 #: The same for the inner iteration: nanometres, as rods bent by more change the robot's soft directions.
-INNER_STEP: Final = 1e-4
+INNER_DEVIATION: Final = 1e-4
 #: Eigenvalues kept per point.
 COUNT: Final = 4
 #: The map is applied to a random deviation this often before the search begins, so that stiff parts have died out.
@@ -115,7 +115,9 @@ class _Probe:
     """Takes the records of a run, and looks at the loop before the steps that were asked for."""
 
     def __init__(self, parts: Parts, wanted: Sequence[int], progress: Progress) -> None:
-        self._parts, self._wanted, self._progress = parts, frozenset(wanted), progress
+        self._parts = parts
+        self._wanted = frozenset(wanted)
+        self._progress = progress
         self.points: list[StabilityPoint] = []
         self.states, self.what = 0, ""
 
@@ -160,7 +162,7 @@ def spectrum_of(step: StepMap) -> tuple[NDArray[np.complex128], bool]:
     Raises:
         StoppedError: If the plant's integrator did not converge, or a command is no number.
     """
-    product = derivative(step, step.size, STEP, central=True)
+    product = derivative(step, step.size, DEVIATION, central=True)
     start = np.random.default_rng(0).standard_normal(step.size)
     for _ in range(SMOOTHING if step.size > COUNT else 0):
         start = product(start / np.linalg.norm(start))
@@ -177,6 +179,6 @@ def inner_radius(inner: InnerMap | None) -> float:
         return inner.apply(inner.point + inner.scale * x) / inner.scale
 
     size = inner.point.size
-    product = derivative(scaled, size, INNER_STEP, central=True)
+    product = derivative(scaled, size, INNER_DEVIATION, central=True)
     start = product(product(np.random.default_rng(0).standard_normal(size)))
     return largest_eigenvalues(product, start, 1).radius if start.any() else 0.0

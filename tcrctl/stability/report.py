@@ -89,7 +89,7 @@ class StabilityReport:
         return "; ".join(parts) or "the run was too short to be linearised"
 
     def frequency(self, point: StabilityPoint) -> float:
-        """Frequency of the largest eigenvalue [Hz], at most half the control rate: faster ones look slower."""
+        """Return the largest eigenvalue's frequency [Hz], at most half the control rate: faster looks slower."""
         return float(abs(np.angle(point.eigenvalues[0])) / (2.0 * np.pi * self.period))
 
     def growth(self, point: StabilityPoint) -> float:
@@ -97,7 +97,7 @@ class StabilityReport:
         return float(point.radius ** (1.0 / self.period))
 
     def columns(self) -> dict[str, Array]:
-        """Every number but the further eigenvalues as one array (n_points,); the unit ends its name."""
+        """Return every number but the further eigenvalues as one array (n_points,); the unit ends its name."""
         rows = self.points
         return {
             "t_s": np.array([p.t for p in rows]),
@@ -111,7 +111,7 @@ class StabilityReport:
         }
 
     def as_json(self) -> dict[str, Any]:
-        """The object of ``tcrctl stability --json``; numbers that are not finite become null."""
+        """Return the object of ``tcrctl stability --json``; numbers that are not finite become null."""
         columns, worst = self.columns(), self.worst
         points = [
             dict(zip(columns, map(_number, row), strict=True)) for row in zip(*columns.values(), strict=True)

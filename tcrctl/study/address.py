@@ -54,7 +54,7 @@ def address(loaded: LoadedSpec, seed: int, *, random_path: bool) -> str:
 
 @cache
 def program() -> str:
-    """Digest of the sources that numbers depend on, and of the versions of the packages they are computed with."""
+    """Return the digest of the sources that numbers depend on, and of the versions of numerical packages."""
     digest = hashlib.sha256()
     for name, content in _sources():
         digest.update(name.encode() + b"\0" + content + b"\0")

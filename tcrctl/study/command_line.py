@@ -61,7 +61,7 @@ def _assign(data: dict[str, Any], places: dict[Keys, str], assignment: str) -> N
 
 
 def _parsed(assignment: str) -> tuple[str, list[Any]]:
-    """Key and values of an assignment; commas within brackets and quotes belong to a value."""
+    """Return key and values of an assignment; commas within brackets and quotes belong to a value."""
     key, equals, text = (part.strip() for part in assignment.partition("="))
     if not equals or not text or not all(key.split(".")):
         raise _refused(

@@ -31,13 +31,13 @@ class Cell:
     values: Mapping[str, Any]
 
     def changes(self, spec: StudySpec) -> dict[str, Any]:
-        """Settings by dotted key, in the order in which they apply."""
+        """Return settings by dotted key, in the order in which they apply."""
         case = {} if self.case is None else spec.cases[self.case]
         kept = {key: value for key, value in spec.set.items() if key not in case}
         return {**kept, **case, **self.values}
 
     def levels(self, experiment: str) -> dict[str, str]:
-        """Factor by factor what it has, as text for tables.
+        """Return factor by factor what it has, as text for tables.
 
         Args:
             experiment: Name of the experiment.
@@ -47,7 +47,7 @@ class Cell:
 
 
 def shown(value: Any) -> str:
-    """A value as it would be written in a file."""
+    """Return a value as it would be written in a file."""
     if isinstance(value, str):
         return value
     if isinstance(value, float):
@@ -75,7 +75,7 @@ def _points(spec: StudySpec) -> Iterator[Sequence[Any]]:
 
 
 def _listed(axis: Axis) -> Sequence[Any]:
-    """Values of a list, or of a range in steps; whole numbers of a narrow range come once."""
+    """Return the values of a list, or of a range in steps; whole numbers of a narrow range come once."""
     if isinstance(axis, RangeSettings):
         steps = axis.steps or 0
         return tuple(dict.fromkeys(_at(axis, i / (steps - 1)) for i in range(steps)))
@@ -98,7 +98,7 @@ def _sampled(spec: StudySpec, axes: Sequence[Axis]) -> Iterator[Sequence[Any]]:
 
 
 def _at(axis: Axis, u: float) -> Any:
-    """Value at a place of the unit interval, to six digits: what a table shows is what was run."""
+    """Return the value at a place of the unit interval, to six digits: what a table shows is what was run."""
     if isinstance(axis, RangeSettings):
         if axis.scale == "log":
             value = axis.low * (axis.high / axis.low) ** u

@@ -31,7 +31,7 @@ class Estimate:
     seconds: float | None
 
     def as_json(self) -> dict[str, Any]:
-        """The runs, for programs."""
+        """Return the runs, for programs."""
         return {
             "runs": [{"run": run.address, **run.levels, "seed": run.seed} for run in self.runs],
             "missing": self.missing,

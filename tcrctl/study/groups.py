@@ -125,7 +125,7 @@ def _pairs(
 
 
 def _medians(name: str, factors: Sequence[str], runs: Sequence[Run]) -> dict[Key, float]:
-    """Median of a measure over all runs that a pair cannot tell apart; mostly there is one."""
+    """Return the median of a measure over all runs that a pair cannot tell apart; mostly there is one."""
 
     def key(run: PlannedRun) -> Key:
         return tuple(str(run.seed) if f == SEED else run.levels.get(f, "") for f in factors)

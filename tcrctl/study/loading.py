@@ -58,7 +58,7 @@ class LoadedStudy:
         return loaded
 
     def experiment_path(self, name: str) -> str:
-        """Name or path as other parts of the program take it.
+        """Return name or path as other parts of the program take it.
 
         Raises:
             SpecError: If it is a study.
@@ -71,7 +71,7 @@ class LoadedStudy:
         return path
 
     def _beside(self, key: str, value: Any) -> Any:
-        """A robot's file is looked for beside the study; everything else is as it is given."""
+        """Look for a robot's file beside the study; leave everything else as it is given."""
         if key in _FILES and isinstance(value, str) and shipped.is_path(value):
             path = self.folder / Path(value).expanduser()
             return str(path.absolute()) if path.is_file() else value
@@ -82,7 +82,7 @@ class LoadedStudy:
         self.document.refuse([(("experiments", index), message)])
 
     def _placed(self, problem: Problem, cell: Cell) -> Problem:
-        """A problem of a setting, at the place where the study gives it."""
+        """Put a problem of a setting at the place where the study gives it."""
         key = problem.where.removeprefix("--set ")
         if key == problem.where:
             return problem

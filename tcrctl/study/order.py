@@ -49,7 +49,7 @@ class Order:
 
 
 def do(order: Order) -> Row | None:
-    """Do a run; None if a signal stopped it.
+    """Do a run; return None if a signal stopped it.
 
     Args:
         order: What to do.

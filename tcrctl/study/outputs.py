@@ -42,7 +42,7 @@ class Findings:
     differences: tuple[Difference, ...]
 
     def tables(self, *, brief: bool = False) -> list[TextTable]:
-        """Groups, and differences if there are any, as text; brief: as in :func:`group_table`."""
+        """Return groups, and differences if there are any, as text; brief: as in :func:`group_table`."""
         found = [group_table(self.groups, brief=brief)]
         if self.spec.compare is not None and self.differences:
             found.append(
@@ -51,11 +51,11 @@ class Findings:
         return found
 
     def text(self, form: Format) -> str:
-        """All tables in one of the formats."""
+        """Return all tables in one of the formats."""
         return "\n".join(table.formatted(form) for table in self.tables())
 
     def as_json(self) -> dict[str, Any]:
-        """Groups and differences for programs; infinite and unknown numbers become null."""
+        """Return groups and differences for programs; infinite and unknown numbers become null."""
         return {
             "groups": [_plain(dataclasses.asdict(group)) for group in self.groups],
             "differences": [_plain(dataclasses.asdict(item)) for item in self.differences],

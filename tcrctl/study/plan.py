@@ -61,5 +61,5 @@ def _of_cell(study: LoadedStudy, cell: Cell) -> Iterator[PlannedRun]:
 
 
 def seeds_of(spec: StudySpec, loaded: LoadedSpec) -> Sequence[int]:
-    """Seeds of a cell: those of the study, or the experiment's own."""
+    """Return the seeds of a cell: those of the study, or the experiment's own."""
     return (loaded.spec.seed,) if spec.seeds is None else spec.seeds

@@ -53,12 +53,12 @@ class Row:
         return self.status in FINISHED
 
     def dumps(self) -> bytes:
-        """The row as one line of JSON."""
+        """Return the row as one line of JSON."""
         return json.dumps(dataclasses.asdict(self), separators=(",", ":")).encode() + b"\n"
 
 
 def loads(line: bytes) -> Row | None:
-    """Read a line; None if it is not one that was written whole."""
+    """Read a line; return None if it is not one that was written whole."""
     try:
         data = json.loads(line)
         return Row(**data) if line.endswith(b"\n") else None
@@ -67,5 +67,5 @@ def loads(line: bytes) -> Row | None:
 
 
 def same_every_time(result: Mapping[str, Any]) -> dict[str, Any]:
-    """The part of a result that does not depend on when and where the run was."""
+    """Return the part of a result that does not depend on when and where the run was."""
     return {key: value for key, value in result.items() if key not in _ELSEWHERE}

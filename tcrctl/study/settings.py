@@ -107,7 +107,7 @@ def _length(axis: Any) -> int:
 
 
 def _overlap(a: str, b: str) -> bool:
-    """Whether one key is the other or a section around it."""
+    """Tell whether one key is the other or a section around it."""
     return f"{a}.".startswith(f"{b}.") or f"{b}.".startswith(f"{a}.")
 
 

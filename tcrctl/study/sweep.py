@@ -66,7 +66,7 @@ class Done:
 
 
 def folder_of(study: LoadedStudy, out: Path) -> Path:
-    """Folder of a study: the same one every time, so that it is found again."""
+    """Return the folder of a study: the same one every time, so that it is found again."""
     return out / f"{study.spec.name}.study"
 
 
@@ -95,7 +95,9 @@ def sweep(
         DeviceError: If the folder cannot be used.
     """
     check_writable(out)
-    folder, begin, new = folder_of(study, out), time.monotonic(), 0
+    folder = folder_of(study, out)
+    begin = time.monotonic()
+    new = 0
     interruption: RunInterruptedError | DeviceError | None = None
     with Store(folder) as store:
         (folder / STUDY).write_text(strict_yaml.dumps(study.spec.model_dump(mode="json")), encoding="utf-8")
@@ -113,7 +115,7 @@ def sweep(
 
 
 def _missing(runs: Sequence[PlannedRun], store: Store) -> list[PlannedRun]:
-    """Runs that the store has not, each address once."""
+    """Return the runs that the store has not, each address once."""
     return list({run.address: run for run in runs if run.address not in store}.values())
 
 
@@ -148,7 +150,7 @@ def _rows(
 
 
 def _orders(study: LoadedStudy, missing: Sequence[PlannedRun], folder: Path, logs: Logs) -> Iterator[Order]:
-    """Orders in the order of the plan; the experiment of a cell is read once for all its seeds."""
+    """Yield orders in the order of the plan; the experiment of a cell is read once for all its seeds."""
     cell: Cell | None = None
     loaded: LoadedSpec | None = None
     for run in missing:

@@ -39,7 +39,7 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
 
     def csv(self) -> str:
-        """The table as comma-separated values; numbers with all their digits, nothing for what is not there."""
+        """Return the table as comma-separated values: numbers with all digits, nothing for what is not there."""
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(self.columns)
@@ -76,7 +76,7 @@ def _text(value: Cell) -> str:
 
 
 def _even(values: Sequence[Cell]) -> list[Cell]:
-    """Values of one kind: numbers that are sometimes whole are all floats."""
+    """Make values of one kind: numbers that are sometimes whole are all floats."""
     floats = any(isinstance(value, float) for value in values)
     return [float(v) if floats and isinstance(v, int) and not isinstance(v, bool) else v for v in values]
 
@@ -133,7 +133,7 @@ def _number(result: Mapping[str, Any], name: str) -> Cell:
 
 
 def _task_values(row: Row) -> dict[str, Cell]:
-    """Numbers and flags of a task by dotted name."""
+    """Return numbers and flags of a task by dotted name."""
     return dict(_flat(row.result.get("task") or {}, "task"))
 
 

@@ -34,27 +34,27 @@ class TextTable:
     rows: tuple[tuple[str, ...], ...]
 
     def markdown(self) -> str:
-        """The table in Markdown."""
+        """Return the table in Markdown."""
         lines = (self.head, ("---",) * len(self.head), *self.rows)
         return (
             "\n".join("| " + " | ".join(c.replace("|", "\\|") for c in line) + " |" for line in lines) + "\n"
         )
 
     def latex(self) -> str:
-        """The table for LaTeX with the package booktabs."""
+        """Return the table for LaTeX with the package booktabs."""
         lines = [" & ".join(_for_latex(cell) for cell in row) + r" \\" for row in (self.head, *self.rows)]
         begin = rf"\begin{{tabular}}{{{'l' * len(self.head)}}}"
         ruled = [r"\toprule", lines[0], r"\midrule", *lines[1:], r"\bottomrule"]
         return "\n".join([begin, *ruled, r"\end{tabular}", ""])
 
     def csv(self) -> str:
-        """The table as comma-separated values."""
+        """Return the table as comma-separated values."""
         stream = io.StringIO()
         csv.writer(stream, lineterminator="\n").writerows((self.head, *self.rows))
         return stream.getvalue()
 
     def formatted(self, form: Format) -> str:
-        """The table in one of the formats; Markdown for people."""
+        """Return the table in one of the formats; Markdown for people."""
         return {"csv": self.csv, "latex": self.latex}.get(form, self.markdown)()
 
 
@@ -71,10 +71,8 @@ def group_table(found: Sequence[Group], *, brief: bool = False) -> TextTable:
     """
     if not found:
         return TextTable(("runs",), ())
-    factors, measures = (
-        list(found[0].levels),
-        [n for n in found[0].measures if any(g.measures[n] for g in found)],
-    )
+    factors = list(found[0].levels)
+    measures = [n for n in found[0].measures if any(g.measures[n] for g in found)]
     head = (
         *factors,
         "runs",
@@ -157,7 +155,7 @@ def _share_cell(found: Share) -> str:
 
 
 def number(value: float, sign: str = "") -> str:
-    """Three digits; infinite is what was stopped."""
+    """Return three digits; infinite is what was stopped."""
     if math.isinf(value):
         return "stopped" if not sign else ("+stopped" if value > 0 else "-stopped")
     return f"{value:{sign}.3g}"

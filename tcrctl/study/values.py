@@ -13,7 +13,7 @@ _LARGE_IS_GOOD: Final = (".min", ".detected", ".beam_passes")
 
 
 def large_is_good(name: str) -> bool:
-    """Whether a larger value of a measure is a better one."""
+    """Tell whether a larger value of a measure is a better one."""
     return name.endswith(_LARGE_IS_GOOD)
 
 

@@ -41,7 +41,7 @@ def segments(q: Array) -> tuple[Array, Array]:
 
 
 def segment_name(row: int) -> str:
-    """Name of the part that a row of :func:`segments` belongs to."""
+    """Return the name of the part that a row of :func:`segments` belongs to."""
     module, part = divmod(row, RING + SIDES)
     name = module_names(module)[module]
     return f"rod {name}.{LABELS[part]}" if part < RING else f"ring {name}"

@@ -27,7 +27,7 @@ class Bore(NamedTuple):
 
 
 def plane_hit(origin: Array, direction: Array, point: Array, normal: Array) -> float:
-    """Distance along a ray to a plane.
+    """Return the distance along a ray to a plane.
 
     Args:
         origin: Where the ray begins (3,) [m].
@@ -46,7 +46,7 @@ def plane_hit(origin: Array, direction: Array, point: Array, normal: Array) -> f
 
 
 def off_axis(origin: Array, direction: Array, bore: Bore, depth: float) -> float:
-    """Distance of a ray from the axis of a bore where it is ``depth`` [m] behind the entry [m].
+    """Return the distance of a ray from the axis of a bore where it is ``depth`` [m] behind the entry [m].
 
     Inf if the ray never gets there.
     """
@@ -58,7 +58,7 @@ def off_axis(origin: Array, direction: Array, bore: Bore, depth: float) -> float
 
 
 def clearance(origin: Array, direction: Array, bore: Bore) -> float:
-    """Smallest distance of a ray from the wall of a bore that it goes through, from the entry to the exit.
+    """Return smallest distance of a ray from the wall of a bore that it goes through, from the entry to the exit.
 
     Between two cross sections the distance from the axis is a convex function of the depth, so that it is largest
     at one of them.

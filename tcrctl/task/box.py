@@ -43,7 +43,8 @@ def box_from_markers(settings: BoxSettings, seen: Seen = exactly) -> Box:
         seen: How the markers are seen.
     """
     top_left, top_right, low_right, low_left = markers = seen(MM * np.array(settings.markers_mm))
-    up, right = top_left + top_right - low_left - low_right, top_right + low_right - top_left - low_left
+    up = top_left + top_right - low_left - low_right
+    right = top_right + low_right - top_left - low_left
     into = unit(np.cross(up, right))
     left = unit(np.cross(up, into))
     frame = np.stack((into, left, np.cross(into, left)))
@@ -66,7 +67,11 @@ def hole_targets(settings: BoxInspectionSettings, seen: Seen) -> dict[str, EndPo
 
 
 def _walls(settings: BoxSettings, origin: Array, frame: Array) -> Plates:
-    middles, frames, halves, holes, first = [], [], [], [], [0]
+    middles = []
+    frames = []
+    halves = []
+    holes = []
+    first = [0]
     centre = origin + 0.5 * MM * settings.size_mm[0] * frame[0]
     for wall, (axis, side) in WALLS.items():
         out = side * frame[axis]

@@ -80,12 +80,12 @@ class BoxInspection:
         ]
 
     def _is_hidden(self, i: int, eye: Array) -> bool:
-        """Whether the middle of object ``i`` is behind another object."""
+        """Tell whether the middle of object ``i`` is behind another object."""
         others = [j for j in range(len(self._names)) if j != i]
         return any(hides(eye, self._centres[i], self._centres[j], self._radii[j]) for j in others)
 
     def result(self) -> dict[str, Any]:
-        """What was seen before any collision, and the first collision."""
+        """Return what was seen before any collision, and the first collision."""
         complete = len(self._seen) == len(self._names)
         return {
             "objects": [

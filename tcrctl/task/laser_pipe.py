@@ -43,7 +43,10 @@ class LaserPipe:
             wanted: Their targets as the trajectory knows them.
             beam: Radius of the beam [m].
         """
-        self._pipes, self._wanted, self._beam, self._period = pipes, wanted, beam, 0.0
+        self._pipes = pipes
+        self._wanted = wanted
+        self._beam = beam
+        self._period = 0.0
         self._visits = [_Visit() for _ in pipes]
 
     def observe(self, step: StepRecord) -> list[Event]:
@@ -70,7 +73,7 @@ class LaserPipe:
         visit.spot_offset = max(visit.spot_offset, spot)
 
     def result(self) -> dict[str, Any]:
-        """``targets``: for each pipe the worst while the end rested there; None if it never came so far."""
+        """Return ``targets``: for each pipe the worst while the end rested there; None if it never came so far."""
         return {
             "targets": [
                 self._target(pipe, visit) for pipe, visit in zip(self._pipes, self._visits, strict=True)
@@ -101,7 +104,7 @@ def _at(reference: Reference, wanted: EndPose) -> bool:
 
 
 def _theta_error(normal: Array, target: EndPose) -> Array:
-    """Magnitudes of the errors of both angles of (45) (2,) [rad]."""
+    """Return the magnitudes of the errors of both angles of (45) (2,) [rad]."""
     assert target.normal is not None
     error = np.subtract(angles_from_normal(normal), angles_from_normal(target.normal))
     wrapped: Array = np.abs((error + np.pi) % (2.0 * np.pi) - np.pi)

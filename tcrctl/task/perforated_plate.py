@@ -20,7 +20,7 @@ DEEPEST = 40  # halvings of a segment; it is below any tolerance then
 
 @njit(cache=True)
 def point_distance(u: float, v: float, w: float, half: Array, holes: Array) -> float:
-    """Distance of a point to a plate.
+    """Return the distance of a point to a plate.
 
     Args:
         u: First coordinate of the point in the plate's frame [m].
@@ -44,10 +44,10 @@ def point_distance(u: float, v: float, w: float, half: Array, holes: Array) -> f
 def segment_distance(
     start: Array, end: Array, half: Array, holes: Array, farthest: float, tolerance: float
 ) -> float:
-    """Distance of a segment to a plate, by branch and bound.
+    """Return the distance of a segment to a plate, by branch and bound.
 
-    The distance to the plate changes along the segment by no more than the length gone. A part with half length h
-    whose middle has the distance D holds nothing nearer than D - h: it is halved as long as that could matter.
+    The distance to the plate changes along the segment by no more than the length gone. A part with half length r
+    whose middle has the distance D holds nothing nearer than D - r: it is halved as long as that could matter.
 
     Args:
         start: In the plate's frame (3,) [m].
@@ -133,7 +133,9 @@ def nearest(
     Returns:
         The distance [m], the segment's row and the plate's; ``farthest``, -1, -1 if nothing is nearer.
     """
-    best, segment, plate = farthest, -1, -1
+    best = farthest
+    segment = -1
+    plate = -1
     a, b = np.empty(3), np.empty(3)
     for i in range(plates.half.shape[0]):
         holes = plates.holes[plates.first_hole[i] : plates.first_hole[i + 1]]
@@ -142,7 +144,9 @@ def nearest(
             _local(plates, i, end[j], b)
             distance = segment_distance(a, b, plates.half[i], holes, best, tolerance)
             if distance < best:
-                best, segment, plate = distance, j, i
+                best = distance
+                segment = j
+                plate = i
     return best, segment, plate
 
 

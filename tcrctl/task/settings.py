@@ -19,17 +19,27 @@ SYMMETRY_MM: Final = 1.0
 
 #: Names of what is found for every target, and for a box as a whole; numbers and flags only.
 TARGET_RESULTS: Final = (
-    "position_error_mm", "theta_x_error_rad", "theta_y_error_rad", "beam_passes", "bore_clearance_mm",
-    "spot_offset_mm", "dwell_s",
-)  # fmt: skip
+    "position_error_mm",
+    "theta_x_error_rad",
+    "theta_y_error_rad",
+    "beam_passes",
+    "bore_clearance_mm",
+    "spot_offset_mm",
+    "dwell_s",
+)
 BOX_RESULTS: Final = ("detected", "detection_s", "collision", "collision_s", "smallest_clearance_mm")
 
 Label: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 Wall: TypeAlias = Literal["left", "right", "front", "back", "bottom", "top"]
 #: Axis of the box that each wall is across, and on which side of the inside the wall is.
 WALLS: Final[dict[Wall, tuple[int, int]]] = {
-    "left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1), "bottom": (2, -1), "top": (2, 1)
-}  # fmt: skip
+    "left": (0, -1),
+    "right": (0, 1),
+    "front": (1, -1),
+    "back": (1, 1),
+    "bottom": (2, -1),
+    "top": (2, 1),
+}
 
 
 def _middle(points: Sequence[Vector]) -> Vector:
@@ -156,7 +166,7 @@ class BoxSettings(Settings):
         return self
 
     def sides_mm(self, wall: Wall) -> tuple[float, float]:
-        """Both sides of a wall [mm], in the order of x, y, z."""
+        """Return both sides of a wall [mm], in the order of x, y, z."""
         across, _ = WALLS[wall]
         first, second = (size for axis, size in enumerate(self.size_mm) if axis != across)
         return first, second

@@ -29,7 +29,7 @@ class Task(Protocol):
         ...
 
     def result(self) -> dict[str, Any]:
-        """The object ``task`` of ``run --json``, for the steps so far."""
+        """Return the object ``task`` of ``run --json``, for the steps so far."""
         ...
 
 
@@ -77,7 +77,7 @@ def build_task(settings: TaskSettings, seed: int, rod_diameter: float) -> Task:
 
 
 def _noisy(deviation: float, seed: int) -> Seen:
-    """Cameras with noise of some standard deviation [m]."""
+    """Return what cameras see with noise of some standard deviation [m]."""
     random = np.random.default_rng((seed, _STREAM))
 
     def seen(markers: Array) -> Array:

@@ -64,7 +64,8 @@ def rounding(before: PlanePiece, after: PlanePiece, radius: float) -> Rounding |
         middle = 0.5 * (low + high)
         low, high = (middle, high) if clearance(middle) < 0.0 else (low, middle)
     tail, head = high, after.nearest(centre(high))
-    start, tangent = before.point(before.length - tail), before.direction(before.length - tail)
+    start = before.point(before.length - tail)
+    tangent = before.direction(before.length - tail)
     sweep = side * cmath.phase(after.direction(head) / tangent)
     if not (0.0 <= head <= 0.5 * after.length and sweep > 0.0):
         return None

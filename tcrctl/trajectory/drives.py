@@ -118,5 +118,5 @@ def end_poses(corners: Array, s: Array, robot: Robot) -> tuple[Array, Array]:
 
 
 def _interpolated(s: Array, at: Array, values: Array) -> Array:
-    """Linear interpolation of every column of values (k, c) given at (k,); (n, c) at s (n,)."""
+    """Return the linear interpolation of every column of values (k, c) given at (k,); (n, c) at s (n,)."""
     return np.stack([np.interp(s, at, column) for column in values.T], axis=1)

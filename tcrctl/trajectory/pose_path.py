@@ -210,7 +210,7 @@ class PosePath:
         return normal
 
     def _located(self, t: Array) -> list[tuple[PoseCurve, Array, NDArray[np.intp]]]:
-        """Curves, their parameters and the indices of the times that fall on them."""
+        """Return the curves, their parameters and the indices of the times that fall on them."""
         s = self.time_law.arc_length(t)
         index = np.clip(np.floor(s), 0, len(self.curves) - 1).astype(np.intp)
         found = []

@@ -108,7 +108,7 @@ def rest_to_rest(path: Sequence[Zone], limits: MotionLimits) -> list[Phase]:
 
 
 def _boundary_speeds(path: Sequence[Zone], limits: MotionLimits) -> list[float]:
-    """Largest speeds between the zones that can be reached and left within the zones."""
+    """Return the largest speeds between the zones that can be reached and left within the zones."""
     speeds = [0.0, *(min(a.speed, b.speed) for a, b in pairwise(path)), 0.0]
     for i, zone in enumerate(path):
         speeds[i + 1] = _reachable(zone, speeds[i], speeds[i + 1], limits)

@@ -78,11 +78,11 @@ class StartBlend:
         return drives_of(self._trajectory, self._since(t))
 
     def _since(self, t: Array) -> Array:
-        """Times of the trajectory at times t (n,) of the run."""
+        """Return times of the trajectory at times t (n,) of the run."""
         return np.maximum(t - self.approach, 0.0) if self.approach else t
 
     def _left(self, t: Array) -> Array:
-        """Part of the offset that is left at times t (n,)."""
+        """Return the part of the offset that is left at times t (n,)."""
         return fade_out(t / self._fading) if self._fading > 0.0 else np.zeros(t.shape)
 
 

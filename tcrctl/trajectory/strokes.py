@@ -80,10 +80,8 @@ def build_strokes(settings: StrokesSettings, robot: Robot) -> StrokesTrajectory:
 def moves(settings: StrokesSettings, rest_position: Array) -> Iterator[Move]:
     """Yield lead-in, approach, strokes, dwells, travel moves and the final rest in order."""
     plane = Plane.of(settings.plane, rest_position)
-    draw, travel = (
-        _limits(settings, settings.speed_limit_mm_s),
-        _limits(settings, settings.travel_speed_limit_mm_s),
-    )
+    draw = _limits(settings, settings.speed_limit_mm_s)
+    travel = _limits(settings, settings.travel_speed_limit_mm_s)
     position = rest_position
     yield _rest(settings.lead_in_s)
     for stroke in settings.strokes:

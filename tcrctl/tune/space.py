@@ -25,7 +25,7 @@ class Space:
     axes: Mapping[str, RangeSettings]
 
     def settings(self, x: Sequence[float]) -> dict[str, Any]:
-        """Settings at a point; what is outside the cube is put onto its side.
+        """Return the settings at a point; what is outside the cube is put onto its side.
 
         Args:
             x: Coordinates (n,); further ones mean nothing.
@@ -36,7 +36,7 @@ class Space:
         }
 
     def point(self, settings: Mapping[str, float]) -> list[float]:
-        """Where some settings stand, put into the cube (n,)."""
+        """Return where some settings stand, put into the cube (n,)."""
         return [min(max(_place(axis, settings[key]), 0.0), 1.0) for key, axis in self.axes.items()]
 
 
@@ -65,7 +65,8 @@ def space_of(spec: StudySpec, document: Document) -> Space:
 
 
 def _value(axis: RangeSettings, u: float) -> float:
-    ratio, gap = axis.high / axis.low if axis.scale == "log" else 1.0, axis.high - axis.low
+    ratio = axis.high / axis.low if axis.scale == "log" else 1.0
+    gap = axis.high - axis.low
     value = axis.low * ratio**u if axis.scale == "log" else axis.low + u * gap
     return round(value) if axis.whole else float(f"{value:.4g}")
 

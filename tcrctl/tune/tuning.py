@@ -83,7 +83,7 @@ class Tuned:
 
 
 @dataclass
-class _Bench:
+class _Trials:
     """Runs sets of settings on plants."""
 
     study: LoadedStudy
@@ -100,7 +100,7 @@ class _Bench:
         return done(result.runs, result.rows)
 
     def spec(self, settings: Mapping[str, Mapping[str, Any]], seeds: Sequence[int]) -> StudySpec:
-        """The study that these runs are."""
+        """Return the study that these runs are."""
         changes = {
             "cases": {name: dict(values) for name, values in settings.items()},
             "vary": {},
@@ -127,36 +127,36 @@ def tune(study: LoadedStudy, search: Search, *, engine: Engine, out: Path, told:
         InputError: If the package cma is not installed, or a plant would be its own judge.
         RunInterruptedError: If a signal came; what is done is kept.
     """
-    space, measure, seeds = (
-        space_of(study.spec, study.document),
-        study.spec.measures[0],
-        study.spec.seeds or (),
-    )
+    space = space_of(study.spec, study.document)
+    measure = study.spec.measures[0]
+    seeds = study.spec.seeds or ()
     if {*seeds} & {*search.held_out}:
         raise InputError("the plants that judge must not be those that are tuned on", hint="See --held-out.")
-    bench = _Bench(study, engine, out, told)
-    shipped = bench.runs({SHIPPED: {}}, seeds)
+    trials = _Trials(study, engine, out, told)
+    shipped = trials.runs({SHIPPED: {}}, seeds)
     sizes = scales(shipped, measure)
     before = score(shipped, measure, sizes)
-    settings, after, best = _searched(bench, space, search, sizes, before)
+    settings, after, best = _searched(trials, space, search, sizes, before)
     both = {SHIPPED: {}, TUNED: settings}
-    judged = bench.runs(both, search.held_out)
+    judged = trials.runs(both, search.held_out)
     marks = {name: score(runs, measure, sizes) for name, runs in by_case(judged).items()}
-    judging = bench.spec(both, search.held_out)
+    judging = trials.spec(both, search.held_out)
     return Tuned(settings, before, after, marks[SHIPPED], marks[TUNED], best, judging, tuple(judged))
 
 
 def _searched(
-    bench: _Bench, space: Space, search: Search, sizes: Scales, before: float
+    trials: _Trials, space: Space, search: Search, sizes: Scales, before: float
 ) -> tuple[dict[str, Any], float, tuple[float, ...]]:
-    """Best settings, their score, and the best score after every generation."""
-    measure, seeds = bench.study.spec.measures[0], bench.study.spec.seeds or ()
-    strategy = _strategy(_start(bench.study, space), search)
-    settings, least, best = dict[str, Any](), before, list[float]()
+    """Return the best settings, their score, and the best score after every generation."""
+    measure, seeds = trials.study.spec.measures[0], trials.study.spec.seeds or ()
+    strategy = _strategy(_start(trials.study, space), search)
+    settings = dict[str, Any]()
+    least = before
+    best = list[float]()
     for _ in range(search.generations):
         asked = strategy.ask()
         candidates = {f"c{i}": space.settings(x) for i, x in enumerate(asked)}
-        found = by_case(bench.runs(candidates, seeds))
+        found = by_case(trials.runs(candidates, seeds))
         marks = [score(found[name], measure, sizes) for name in candidates]
         strategy.tell(asked, marks)
         first = min(range(len(marks)), key=marks.__getitem__)
@@ -179,7 +179,7 @@ def _strategy(start: list[float], search: Search) -> Any:
 
 
 def _start(study: LoadedStudy, space: Space) -> list[float]:
-    """Where the shipped settings of the first experiment stand; in the middle where it has none."""
+    """Return where the shipped settings of the first experiment stand; in the middle where it has none."""
     data = study.load(Cell(study.spec.experiments[0], None, {})).spec.model_dump(mode="json")
     found = {}
     for key in space.axes:

@@ -5,4 +5,4 @@
 
 The control thread takes no part in it: a live view gets the messages that the log's own thread has made for the
 file, and a client that is too slow loses the oldest ones.
-"""  # fmt: skip
+"""

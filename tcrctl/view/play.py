@@ -78,9 +78,13 @@ class Player:
         if self.first_ns > self.last_ns:
             raise InputError(f"{tape.path}: has nothing to play in this span of time")
         self._tape, self._playback = tape, playback
-        self._clock, self._sleep, self._check = clock, sleep, check
+        self._clock = clock
+        self._sleep = sleep
+        self._check = check
         self._lock = threading.Lock()
-        self._rate, self._playing, self._ended = playback.rate, not playback.paused, False
+        self._rate = playback.rate
+        self._playing = not playback.paused
+        self._ended = False
         self._now_ns = self.first_ns
         self._seek_ns: int | None = self.first_ns
         self._anchor: tuple[float, int] | None = None
@@ -100,7 +104,7 @@ class Player:
         return self.state(did_seek=request.seek_time is not None, request_id=request.request_id)
 
     def state(self, *, did_seek: bool = False, request_id: str | None = None) -> Any:
-        """Playback state for the app."""
+        """Return the playback state for the app."""
         websocket = foxglove_sdk().websocket
         kind = "Ended" if self._ended else "Playing" if self._playing else "Paused"
         status = getattr(websocket.PlaybackStatus, kind)
@@ -128,7 +132,9 @@ class Player:
         """Go where playing shall go on: show at once what was to be seen there, and return what comes then."""
         with self._lock:
             at = self.first_ns if self._seek_ns is None else self._seek_ns
-            self._now_ns, self._seek_ns, self._anchor = at, None, None
+            self._now_ns = at
+            self._seek_ns = None
+            self._anchor = None
         server.forget()
         back = max(_BACK_S, _BACK_STEPS * self._tape.period)
         begin = at if at == self._tape.first_ns else at - round(1e9 * back)
@@ -163,7 +169,7 @@ class Player:
             self._sleep(min(left, _NAP_S))
 
     def _left(self, time_ns: int) -> float:
-        """Time until a message is due [s]."""
+        """Return the time until a message is due [s]."""
         if not self._playing:
             self._anchor = None
             return _NAP_S

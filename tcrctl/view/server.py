@@ -69,7 +69,7 @@ class Listener:
         self.subscribed.set()
 
     def on_unsubscribe(self, client: Any, channel: Any) -> None:
-        """Nothing to do: the server stops sending."""
+        """Do nothing: the server stops sending."""
 
     def on_playback_control_request(self, request: Any) -> Any:
         """Play, pause, change speed or seek."""

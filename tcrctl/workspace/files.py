@@ -28,7 +28,7 @@ end_header
 
 
 def table(found: Workspace) -> str:
-    """Every point as comma-separated values, lengths in mm, tilt in deg, tensions in N."""
+    """Return every point as comma-separated values, lengths in mm, tilt in deg, tensions in N."""
     drives = [f"drive_{name}_mm" for name in found.cables]
     tensions = [f"tension_{name}_n" for name in found.cables]
     columns = np.column_stack(
@@ -42,7 +42,7 @@ def table(found: Workspace) -> str:
 
 
 def point_cloud(found: Workspace) -> str:
-    """End positions as a coloured point cloud in PLY, which 3-D viewers open."""
+    """Return the end positions as a coloured point cloud in PLY, which 3-D viewers open."""
     tilt = np.degrees(found.tilt)
     most = float(tilt.max()) or 1.0
     colour = np.rint(UPRIGHT + (tilt / most)[:, None] * (TILTED - UPRIGHT)).astype(int)

@@ -27,12 +27,12 @@ class Limits:
     Attributes:
         floor: Lowest tension [N].
         ceiling: Highest tension [N].
-        step: Change of the fastest drive between two points [m].
+        spacing: Change of the fastest drive between two points [m].
     """
 
     floor: float
     ceiling: float
-    step: float
+    spacing: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,15 +82,17 @@ def follow(robot: Robot, direction: Array, limits: Limits) -> Ray:
         direction: In the space of drives (m,), not zero; its length does not matter.
         limits: Where it ends; strokes are the robot's.
     """
-    step = limits.step * direction / np.max(np.abs(direction))
+    change = limits.spacing * direction / np.max(np.abs(direction))
     low, high = robot.stroke
-    drive, shape, points = np.zeros(robot.n_cables), robot.rest, []
+    drive = np.zeros(robot.n_cables)
+    shape = robot.rest
+    points = []
     end: End = "long"
-    for _ in range(int(LONGEST / limits.step)):
+    for _ in range(int(LONGEST / limits.spacing)):
         points.append(
             (drive, pose.position(shape.q, robot.tip), pose.normal(shape.q, robot.tip), shape.tension)
         )
-        further = drive + step
+        further = drive + change
         if np.any(further < low) or np.any(further > high):
             end = "stroke"
             break

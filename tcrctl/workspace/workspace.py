@@ -56,7 +56,7 @@ class Workspace:
         return radius
 
     def bands(self) -> list[dict[str, float]]:
-        """Largest radius and tilt in bands of height: ``height_mm`` of the middle, ``radius_mm``, ``tilt_deg``."""
+        """Return the largest ``radius_mm`` and ``tilt_deg`` in bands of height; ``height_mm`` is their middle."""
         height = self.offset[:, 2]
         edges = np.linspace(height.min(), height.max(), BANDS + 1)
         place = np.clip(np.searchsorted(edges, height, side="right") - 1, 0, BANDS - 1)
@@ -72,7 +72,7 @@ class Workspace:
         ]
 
     def as_json(self) -> dict[str, Any]:
-        """The summary for programs."""
+        """Return the summary for programs."""
         ranges = {
             f"{axis}_mm": {"min": 1e3 * float(v.min()), "max": 1e3 * float(v.max())}
             for axis, v in zip("xyz", self.offset.T, strict=True)
@@ -89,7 +89,7 @@ class Workspace:
 
 
 def directions(count: int, cables: int) -> Array:
-    """Directions in the space of drives (count, m), evenly spread: a Sobol sequence made normal.
+    """Return directions in the space of drives (count, m), evenly spread: a Sobol sequence made normal.
 
     Args:
         count: How many.

@@ -18,9 +18,16 @@ from tcrctl.robot.description import load_robot
 pytestmark = pytest.mark.slow
 
 KEYS = {
-    "status", "mean_error_before_mm", "mean_error_after_mm", "held_out_error_mm", "parameters", "unidentifiable",
-    "evaluations", "seconds", "robot_file",
-}  # fmt: skip
+    "status",
+    "mean_error_before_mm",
+    "mean_error_after_mm",
+    "held_out_error_mm",
+    "parameters",
+    "unidentifiable",
+    "evaluations",
+    "seconds",
+    "robot_file",
+}
 DRIVE = """
 name: drive
 robot: tcr5x4
@@ -82,8 +89,12 @@ def test_static_data_become_a_robot_file_that_runs(capsys, tmp_path, data, monke
     file = Path(found["robot_file"])
     assert load_robot(str(file)).springs.youngs_modulus_mpa == found["parameters"][SPRINGS]["value"]
     assert {path.name for path in file.parent.iterdir()} == {
-        "robot.yaml", "report.json", "figure.png", "spec.yaml", "spec.resolved.yaml"
-    }  # fmt: skip
+        "robot.yaml",
+        "report.json",
+        "figure.png",
+        "spec.yaml",
+        "spec.resolved.yaml",
+    }
     assert json.loads((file.parent / "report.json").read_text())["data_sha256"] == found["data_sha256"]
     assert (
         load_spec("letter_t", [f"robot={file}"]).robot.name == f"{LONG}_identified"
@@ -115,9 +126,18 @@ def test_the_new_robot_file_keeps_every_comment_and_says_where_it_comes_from(cap
 
 def test_a_log_gives_the_parameters_of_the_robot_that_moved(capsys, tmp_path, log):
     code, found, _ = answer(
-        capsys, "--from", log, "--robot", ROBOT, "--params", f"{SPRINGS},{CABLES}",
-        "--method", "least-squares", "--out", tmp_path,
-    )  # fmt: skip
+        capsys,
+        "--from",
+        log,
+        "--robot",
+        ROBOT,
+        "--params",
+        f"{SPRINGS},{CABLES}",
+        "--method",
+        "least-squares",
+        "--out",
+        tmp_path,
+    )
     assert (code, found["strung_by"]) == (0, "length")  # the plant kept its rest lengths
     assert found["parameters"][SPRINGS]["value"] == pytest.approx(0.75 * 90, rel=0.05)
     assert found["parameters"][CABLES]["value"] == pytest.approx(1.2 * 2300, rel=0.05)
@@ -129,9 +149,18 @@ def test_a_log_gives_the_parameters_of_the_robot_that_moved(capsys, tmp_path, lo
 
 def test_freeing_the_mass_is_answered_with_a_warning(capsys, tmp_path, data):
     code, found, said = answer(
-        capsys, "--from", data, "--robot", LONG, "--params", f"{SPRINGS},{CABLES},{MASS}",
-        "--method", "least-squares", "--out", tmp_path,
-    )  # fmt: skip
+        capsys,
+        "--from",
+        data,
+        "--robot",
+        LONG,
+        "--params",
+        f"{SPRINGS},{CABLES},{MASS}",
+        "--method",
+        "least-squares",
+        "--out",
+        tmp_path,
+    )
     assert code == 0
     assert any(set(entry["combination"]) == {SPRINGS, CABLES, MASS} for entry in found["unidentifiable"])
     assert "warning: " in said

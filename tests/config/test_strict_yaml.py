@@ -168,8 +168,14 @@ def test_every_problem_of_yaml_and_values_is_listed_in_file_order() -> None:
     lines = ["pet: {kind: dog, length_m: -1, lenght_m: 2}", "pair: [x, .nan]"]
     found = problems_of("\n".join([*lines, "pets: [{kind: cow}, {lives: 3}]", "pair: 1"]))
     assert [line.split(": ")[0] for line in found] == [
-        "f.yaml:1:18", "f.yaml:1:32", "f.yaml:2:8", "f.yaml:2:11", "f.yaml:3:9", "f.yaml:3:21", "f.yaml:4:1",
-    ]  # fmt: skip
+        "f.yaml:1:18",
+        "f.yaml:1:32",
+        "f.yaml:2:8",
+        "f.yaml:2:11",
+        "f.yaml:3:9",
+        "f.yaml:3:21",
+        "f.yaml:4:1",
+    ]
     assert "must be > 0" in found[0]
     assert "not -1" in found[0]
     assert "did you mean length_m?; allowed: kind, dog, length_m" in found[1]
@@ -241,12 +247,19 @@ def test_an_override_changes_its_value_and_nothing_else(data: st.DataObject) -> 
 @pytest.mark.parametrize(
     ("assignment", "words"),
     [
-        ("a", "key=value"), ("=1", "key=value"), ("a=", "key=value"), ("a..b=1", "key=value"),
-        ("e.f=1", "e is 4, neither a map nor a list"), ("b.2=1", "list of 2"), ("b.x=1", "list of 2"),
-        ("b.-1=1", "list of 2"), ("e=.nan", "finite"),
-        ("e=[1", "not YAML"), ("e={a: 1, a: 2}", "duplicate key"),
+        ("a", "key=value"),
+        ("=1", "key=value"),
+        ("a=", "key=value"),
+        ("a..b=1", "key=value"),
+        ("e.f=1", "e is 4, neither a map nor a list"),
+        ("b.2=1", "list of 2"),
+        ("b.x=1", "list of 2"),
+        ("b.-1=1", "list of 2"),
+        ("e=.nan", "finite"),
+        ("e=[1", "not YAML"),
+        ("e={a: 1, a: 2}", "duplicate key"),
     ],
-)  # fmt: skip
+)
 def test_overrides_that_lead_nowhere_are_refused(assignment: str, words: str) -> None:
     document = strict_yaml.loads("b: [1, 2]\ne: 4")
     with pytest.raises(SpecError, match=r"--set") as caught:

@@ -216,7 +216,7 @@ def test_the_forecast_is_what_the_robot_then_does(tcr700):
     state = dynamics.rest_state(tcr700.rest.q, np.zeros(6))
     ws, scratch = make_workspace(tcr700.model), dynamics.make_scratch(tcr700.model)
     speeds = np.repeat(U, np.diff(block_edges(prediction.instants, prediction.blocks)), axis=0)
-    actual, rule = [], dynamics.Rule(step=1e-3, rho=0.8)
+    actual, rule = [], dynamics.Rule(h=1e-3, rho=0.8)
     for speed in speeds:
         dynamics.advance(tcr700.model, state, speed, 0.05, rule, tcr700.weight, ws, scratch)
         actual.append(np.concatenate([pose.position(state.q, tcr700.tip), pose.normal(state.q, tcr700.tip)]))

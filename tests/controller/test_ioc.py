@@ -1,4 +1,4 @@
-"""The quadratic problem (30) and its LCP: optimality, limits, soft tension rows, the paper's special case."""
+"""The quadratic program (30) and its LCP: optimality, limits, soft tension rows, the paper's special case."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tcrctl.controller.ioc import (
     TENSION_SLACK,
     Prediction,
-    Problem,
+    QuadraticProgram,
     Solution,
     Weights,
     build_ioc,
@@ -54,29 +54,29 @@ def cost(case, U: np.ndarray) -> float:
 
 
 def solved(case) -> Solution:
-    problem = build_ioc(*case)
-    return solve_ioc(problem, case[0], case[5])
+    program = build_ioc(*case)
+    return solve_ioc(program, case[0], case[5])
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_hessian_and_gradient_are_those_of_the_cost(seed):
     case = random_case(seed)
-    problem = Problem(*build_ioc(*case))
-    U = 0.03 * np.random.default_rng(seed + 100).standard_normal(problem.g.shape[0])
+    program = QuadraticProgram(*build_ioc(*case))
+    U = 0.03 * np.random.default_rng(seed + 100).standard_normal(program.g.shape[0])
     direction = np.random.default_rng(seed + 200).standard_normal(U.shape[0])
     slope = (cost(case, U + 1e-4 * direction) - cost(case, U - 1e-4 * direction)) / 2e-4
-    assert slope == pytest.approx((problem.H @ U + problem.g) @ direction, rel=1e-6)
-    quadratic = 0.5 * U @ problem.H @ U + problem.g @ U
+    assert slope == pytest.approx((program.H @ U + program.g) @ direction, rel=1e-6)
+    quadratic = 0.5 * U @ program.H @ U + program.g @ U
     assert cost(case, U) - cost(case, 0 * U) == pytest.approx(quadratic, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(60))
 def test_box_problem_agrees_with_an_independent_solver(seed):
     case = random_case(seed)
-    problem = Problem(*build_ioc(*case))
-    size = problem.g.shape[0]
+    program = QuadraticProgram(*build_ioc(*case))
+    size = program.g.shape[0]
     reference, _, flag, _ = daqp.solve(
-        problem.H, problem.g, np.zeros((0, size)), problem.high, problem.low, np.zeros(size, dtype=np.int32)
+        program.H, program.g, np.zeros((0, size)), program.high, program.low, np.zeros(size, dtype=np.int32)
     )
     assert flag == 1
     answer = solved(case)

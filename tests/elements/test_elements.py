@@ -178,7 +178,8 @@ def test_a_cable_pulls_the_same_everywhere_along_its_path():
     residual(model, q, np.array([0.005]), internal(model, q, STATIC), ws)
     rest, k, _, lead = model.cables[0]
     points = [
-        model.hole_weights[h] @ q.reshape(-1, 3)[model.hole_nodes[h]] for h in range(len(model.hole_nodes))
+        model.hole_weights[hole] @ q.reshape(-1, 3)[model.hole_nodes[hole]]
+        for hole in range(len(model.hole_nodes))
     ]
     path = lead + sum(np.linalg.norm(b - a) for a, b in itertools.pairwise(points))
     assert ws.length[0] == pytest.approx(path, rel=1e-14)

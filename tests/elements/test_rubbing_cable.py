@@ -29,7 +29,7 @@ def chain_problem(seed):
 
 
 def by_daqp(wanted, stiffness, cap):
-    """min sum (T - wanted)^2 / (2 k)  subject to  |T_h - T_(h+1)| <= F_h, T >= 0."""
+    """min sum (T - wanted)^2 / (2 k)  subject to  |T_i - T_(i+1)| <= F_i, T >= 0."""
     n, scale = wanted.size, stiffness.mean()
     H = np.diag(scale / stiffness)
     differences = (np.eye(n) - np.eye(n, k=1))[:-1]

@@ -8,7 +8,7 @@ import pytest
 from tcr_hardware.emulators.motive import MotiveEmulator, MotiveSettings
 from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.emulators.plc_faults import FAULTS
-from tcrctl.emulate.fault_script import CAMERA_FAULTS, Player, load_fault_script
+from tcrctl.emulate.fault_script import CAMERA_FAULTS, FaultPlayer, load_fault_script
 from tcrctl.errors import SpecError
 
 
@@ -47,9 +47,12 @@ def test_a_mistake_is_found_before_anything_starts(name, tmp_path):
 
 STRANGERS = {
     "robot": ("{at_s: 1, plc: estop, robot: tcr999}", ":2:27: faults.0.robot: there is no robot tcr999"),
-    "marker": ("{at_s: 1, cameras: {nan: [a.1, b.7]}}", ":2:25: faults.0.cameras.nan: there is no marker b.7"),
+    "marker": (
+        "{at_s: 1, cameras: {nan: [a.1, b.7]}}",
+        ":2:25: faults.0.cameras.nan: there is no marker b.7",
+    ),
     "pair": ("{at_s: 1, cameras: {swap: [[a.1, c.3]]}}", "there is no marker c.3"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", STRANGERS)
@@ -81,7 +84,7 @@ def test_faults_come_and_go_at_their_times(tmp_path, bench):
         "{at_s: 2, plc: jam, with: {axis: 3}, for_s: 1}",
         "{at_s: 0.5, after: moving, plc: silence}",
     )
-    player = Player(made, motive, {"tcr600": plc}, said.append)
+    player = FaultPlayer(made, motive, {"tcr600": plc}, said.append)
     seen = {}
     for now in np.arange(0.0, 6.0, 0.25):
         plc.where = (0.0 if now < 4.0 else 100.0,) * 6
@@ -105,7 +108,7 @@ def test_a_fault_of_one_robot_leaves_the_others_alone(tmp_path, bench):
     motive, plc = bench
     other = PlcEmulator()
     made = script(tmp_path, "{at_s: 0, plc: estop, robot: tcr700}")
-    Player(made, motive, {"tcr600": plc, "tcr700": other}, lambda text: None).play(0.0)
+    FaultPlayer(made, motive, {"tcr600": plc, "tcr700": other}, lambda text: None).play(0.0)
     assert (list(plc.faults.active), list(other.faults.active)) == ([], ["estop"])
 
 
@@ -125,8 +128,8 @@ def test_every_fault_of_the_emulators_can_be_asked_for(tmp_path):
 def test_cameras_change_names_and_version_and_change_them_back(tmp_path, bench):
     motive, plc = bench
     made = script(tmp_path, "{at_s: 1, cameras: {renamed: true, version: '3.1'}, for_s: 1}")
-    player = Player(made, motive, {"tcr600": plc}, lambda text: None)
+    player = FaultPlayer(made, motive, {"tcr600": plc}, lambda text: None)
     player.play(1.0)
-    assert (motive.scene.names, motive.version) == (("a.1?", "a.2?"), (3, 1))
+    assert (motive.tracked.names, motive.version) == (("a.1?", "a.2?"), (3, 1))
     player.play(2.0)
-    assert (motive.scene.names, motive.version) == (("a.1", "a.2"), (4, 1))
+    assert (motive.tracked.names, motive.version) == (("a.1", "a.2"), (4, 1))

@@ -122,12 +122,33 @@ def summary(found, criteria=()):
 
 
 KEYS = [
-    "run_id", "spec", "robot", "plant", "controller", "seed", "overrides", "status", "reason", "steps",
+    "run_id",
+    "spec",
+    "robot",
+    "plant",
+    "controller",
+    "seed",
+    "overrides",
+    "status",
+    "reason",
+    "steps",
     "duration_s",
-    "position_error_mm", "x_error_mm", "orientation_error_deg", "theta_x_error_rad", "theta_y_error_rad",
-    "tension_n", "saturated_fraction", "control_ms", "overruns", "inner_iterations", "unconverged_steps",
-    "criteria", "log", "task", "versions",
-]  # fmt: skip
+    "position_error_mm",
+    "x_error_mm",
+    "orientation_error_deg",
+    "theta_x_error_rad",
+    "theta_y_error_rad",
+    "tension_n",
+    "saturated_fraction",
+    "control_ms",
+    "overruns",
+    "inner_iterations",
+    "unconverged_steps",
+    "criteria",
+    "log",
+    "task",
+    "versions",
+]
 
 
 def test_the_object_has_every_key_in_order_and_every_unit_names_a_number():

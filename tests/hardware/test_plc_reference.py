@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from support.structured_text import FunctionBlock
 from tcr_hardware.emulators.plc_program import PlcCommand, PlcLimitSettings, PlcProgram
 from tcr_hardware.modbus.document import register_map_markdown
-from tcr_hardware.modbus.registers import Control, Fault, Reject, Status, register_map
+from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status, register_map
 from tcr_hardware.servo import ServoSettings
 
 PLC = Path(__file__).parents[2] / "hardware" / "plc"
@@ -36,7 +36,7 @@ def test_the_document_names_every_register_and_bit():
         *(bit.name for bits in (Control, Status) for bit in bits),
     ]:
         assert f"`{name}`" in text
-    for value in [*Reject, *Fault]:
+    for value in [*Reject, *FaultCode]:
         assert value.name.lower().replace("_", " ") in text.lower()
 
 
@@ -97,8 +97,12 @@ def test_the_structured_text_fills_the_registers_that_a_bus_reads(armed):
     assert (registers[122], registers[123]) == (0x0102, 0x0304)
     limits = PlcLimitSettings()
     assert registers[200] == limits.watchdog_ms
-    for name, value in (("MIN", limits.min_um), ("MAX", limits.max_um), ("VMAX_LIMIT", limits.vmax_um_s),
-                        ("STEPMAX", limits.step_max_um)):  # fmt: skip
+    for name, value in (
+        ("MIN", limits.min_um),
+        ("MAX", limits.max_um),
+        ("VMAX_LIMIT", limits.vmax_um_s),
+        ("STEPMAX", limits.step_max_um),
+    ):
         row = MAP[name]
         for at in range(row.address, row.end, 2):
             assert (registers[at] << 16 | registers[at + 1]) == value & 0xFFFFFFFF
@@ -121,7 +125,7 @@ def test_both_plcs_trip_stop_and_reset_alike(armed):
         armed.write(FOLLOW, (3_000 * k, -3_000 * k, 0, 0, 0, 0), 90_000)
         armed.run(20)
     armed.run(200)
-    assert armed.emulated.fault is Fault.WATCHDOG
+    assert armed.emulated.fault is FaultCode.WATCHDOG
     armed.write(Control.RUN | Control.RESET, (0,) * 6)
     armed.run(5)
     armed.write(ON, (0,) * 6)
@@ -131,7 +135,7 @@ def test_both_plcs_trip_stop_and_reset_alike(armed):
     for k in range(1, 8):
         armed.write(FOLLOW, (21_000, -21_000, 0, 2_000 * k, 0, 0), 90_000)
         armed.run(20)
-    assert armed.emulated.fault is Fault.FOLLOWING_ERROR
+    assert armed.emulated.fault is FaultCode.FOLLOWING_ERROR
 
 
 def test_both_plcs_refuse_to_enable_before_the_zero_is_taken():
@@ -152,7 +156,7 @@ def test_both_plcs_clear_a_fault_only_after_its_cause_is_gone(armed, cause):
         armed.run(2)
         armed.write(Control.RUN | Control.RESET, (0,) * 6)
         armed.run(2)
-        assert (armed.emulated.fault is Fault.NONE) == gone
+        assert (armed.emulated.fault is FaultCode.NONE) == gone
 
 
 def moving(both):
@@ -209,12 +213,27 @@ def test_both_plcs_forget_the_silence_before_they_were_enabled(armed):
 
 positions = st.integers(-62_000, 62_000)
 events = st.tuples(
-    st.sampled_from(["creep", "creep", "creep", "send", "hold", "stop", "silence", "estop", "drive", "jam", "reset",
-                     "arm", "zero"]),
+    st.sampled_from(
+        [
+            "creep",
+            "creep",
+            "creep",
+            "send",
+            "hold",
+            "stop",
+            "silence",
+            "estop",
+            "drive",
+            "jam",
+            "reset",
+            "arm",
+            "zero",
+        ]
+    ),
     st.lists(positions, min_size=6, max_size=6),
     st.sampled_from([0, 5_000, 50_000, 90_000, 200_000]),
     st.integers(1, 30),
-)  # fmt: skip
+)
 
 
 def act(both, what, wanted, vmax, scans):

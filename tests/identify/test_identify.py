@@ -19,7 +19,7 @@ from support.identify_data import (
 from tcrctl.errors import InputError, RunInterruptedError
 from tcrctl.executors.engine import Engine
 from tcrctl.identify import identification as module
-from tcrctl.identify.building import build_problem, with_lengths
+from tcrctl.identify.building import build_regression, with_lengths
 from tcrctl.identify.evaluation import Evaluator
 from tcrctl.identify.identification import identify
 from tcrctl.identify.loading import load_identification
@@ -239,9 +239,9 @@ def test_the_shipped_robot_and_the_identified_one_predict_table_2():
 
 
 def test_predictions_cross_to_a_worker_unchanged(tmp_path):
-    problem, _ = build_problem(identification(tmp_path, static_data(true_robot())))
-    x = start_of(problem.parameters)
-    with Evaluator(problem, Engine(2), lambda: None) as evaluator:
+    regression, _ = build_regression(identification(tmp_path, static_data(true_robot())))
+    x = start_of(regression.parameters)
+    with Evaluator(regression, Engine(2), lambda: None) as evaluator:
         first, second = evaluator.predict_many([x, x + 0.01])
-    assert np.array_equal(first, problem.predict(x))
+    assert np.array_equal(first, regression.predict(x))
     assert not np.array_equal(first, second)

@@ -65,9 +65,12 @@ def test_what_repeats_itself_is_told_ever_less_often_and_logged_every_time():
         journal.report("supervisor", "warning", f"held for {50 + k} ms")
     assert len(written) == 20
     assert told == [
-        "warning: held for 50 ms", "warning: held for 51 ms", "warning: held for 53 ms (4 times so far)",
-        "warning: held for 57 ms (8 times so far)", "warning: held for 65 ms (16 times so far)",
-    ]  # fmt: skip
+        "warning: held for 50 ms",
+        "warning: held for 51 ms",
+        "warning: held for 53 ms (4 times so far)",
+        "warning: held for 57 ms (8 times so far)",
+        "warning: held for 65 ms (16 times so far)",
+    ]
 
 
 def test_a_log_that_fails_does_not_keep_anybody_from_reporting():

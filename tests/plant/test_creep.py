@@ -20,7 +20,7 @@ BRANCHES = (CreepBranch(strength=0.1, time_s=0.5), CreepBranch(strength=0.3, tim
 def test_a_constant_tension_gives_the_analytic_elongation_whatever_the_step(h):
     """u(t) = sum r_i (T / k) (1 - exp(-t / tau_i)) after a step from zero."""
     creep, elastic = Creep(BRANCHES, np.zeros(2)), np.array([1e-3, 4e-3])
-    grown = sum(creep.step(elastic, h) for _ in range(round(4.0 / h)))
+    grown = sum(creep.grow(elastic, h) for _ in range(round(4.0 / h)))
     law = sum(b.strength * -np.expm1(-4.0 / b.time_s) for b in BRANCHES)
     np.testing.assert_allclose(grown, law * elastic, rtol=1e-10)
 
@@ -29,7 +29,7 @@ def test_at_rest_nothing_creeps():
     elastic = np.array([1e-3, 4e-3])
     creep = Creep(BRANCHES, elastic)
     for _ in range(100):
-        assert np.abs(creep.step(elastic, 0.01)).max() < 1e-18
+        assert np.abs(creep.grow(elastic, 0.01)).max() < 1e-18
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=60), st.floats(1e-3, 5.0))
@@ -39,7 +39,7 @@ def test_no_loop_of_tensions_gives_energy_back(tensions, h):
     strengths = np.array([b.strength for b in BRANCHES])
     work = 0.0
     for tension in [*tensions, 0.0]:
-        work += float(tension * creep.step(np.array([tension]), h)[0])
+        work += float(tension * creep.grow(np.array([tension]), h)[0])
         stored = float(np.sum(creep.late[:, 0] ** 2 / (2.0 * strengths)))
         assert work >= stored - 1e-15
 

@@ -120,5 +120,5 @@ def test_what_is_reported_can_be_chosen(reports):
 def test_a_drive_without_faults_takes_in_what_its_encoder_says_to_the_last_bit():
     servo = Servo(ServoSettings())
     for k in range(200):
-        servo.step(1000.0 * np.sin(0.1 * k), 0.002)
+        servo.advance(1000.0 * np.sin(0.1 * k), 0.002)
         assert servo.output == servo.position

@@ -62,7 +62,9 @@ def test_masses_geometry_and_holes_have_the_wanted_deviation():
     moved = many(lambda d: undeformed(d) - straight, geometry_mm=0.5)
     assert not moved[:, :12].any()
     assert moved[:, 12:].std() == pytest.approx(5e-4, rel=0.05)
-    holes = many(lambda d: [h.hole_deg for r in d.cables.routes for h in r.through], holes_deg=1.0)
+    holes = many(
+        lambda d: [hole.hole_deg for route in d.cables.routes for hole in route.through], holes_deg=1.0
+    )
     nominal = [0.0] * 14 + [60.0] * 9 + [120.0] * 14 + [180.0] * 9 + [240.0] * 14 + [300.0] * 9
     off = np.remainder(holes - nominal + 180.0, 360.0) - 180.0
     assert off.std() == pytest.approx(1.0, rel=0.05)

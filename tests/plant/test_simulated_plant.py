@@ -150,4 +150,4 @@ def test_a_plant_that_cannot_go_on_says_when_and_how_far_it_tried(tcr5x4):
     with pytest.raises(DivergenceError) as caught:
         plant.write(Command(np.full(4, np.nan), np.zeros(4)))
     assert caught.value.time == PERIOD
-    assert caught.value.smallest_step < 1e-3
+    assert caught.value.smallest_h < 1e-3

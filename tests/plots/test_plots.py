@@ -14,7 +14,7 @@ from PIL import Image
 from support import records
 from support.log_files import STOP, open_log
 from tcrctl.analysis.history import Limits, orientation_angles, read_histories
-from tcrctl.analysis.skeleton import read_skeleton
+from tcrctl.analysis.structure import read_structure
 from tcrctl.cli.app import main
 from tcrctl.cli.plot import plot
 from tcrctl.errors import InputError, UnknownNameError
@@ -259,9 +259,12 @@ def test_labels_are_as_short_as_they_can_be(folder):
 
     a, b = run("a", "x_aaaa", "letter_t"), run("b", "x_bbbb", "heart")
     c, d = run("c", "x_cccc", "heart", "seed=2"), run("d", "x_dddd", "heart", "seed=2")
-    assert [h.label for h in read_histories([a, b])] == ["letter_t", "heart"]
-    assert [h.label for h in read_histories([b, c])] == ["heart", "heart seed=2"]
-    assert [h.label for h in read_histories([c, d])] == ["heart seed=2 (cccc)", "heart seed=2 (dddd)"]
+    assert [history.label for history in read_histories([a, b])] == ["letter_t", "heart"]
+    assert [history.label for history in read_histories([b, c])] == ["heart", "heart seed=2"]
+    assert [history.label for history in read_histories([c, d])] == [
+        "heart seed=2 (cccc)",
+        "heart seed=2 (dddd)",
+    ]
 
 
 def test_a_span_of_time_and_a_cut_log_show_what_is_there(tmp_path):
@@ -289,14 +292,14 @@ def test_drawing_leaves_the_users_style_alone(pose):
 
 
 def test_the_skeleton_is_that_of_the_robot_in_the_log(pose, several, tcr600: Robot):
-    skeleton = read_skeleton(pose[0].log, 48)
+    structure = read_structure(pose[0].log, 48)
     model = tcr600.model
-    assert np.array_equal(skeleton.springs, model.bar_nodes[6 * 11 :])
-    assert_allclose(skeleton.natural_length, model.bars[6 * 11 :, 0])
-    assert skeleton.tip_ring == 11
-    for ours, theirs in zip(skeleton.cables, log_geometry(tcr600).cables, strict=True):
+    assert np.array_equal(structure.springs, model.bar_nodes[6 * 11 :])
+    assert_allclose(structure.natural_length, model.bars[6 * 11 :, 0])
+    assert structure.tip_ring == 11
+    for ours, theirs in zip(structure.cables, log_geometry(tcr600).cables, strict=True):
         assert ours.name == theirs.name
         assert np.array_equal(ours.nodes, theirs.nodes)
         assert_allclose(ours.weights, theirs.weights)
-    assert read_skeleton(pose[0].log, 44) is None
-    assert read_skeleton(several[2].log, 48) is None
+    assert read_structure(pose[0].log, 44) is None
+    assert read_structure(several[2].log, 48) is None

@@ -27,7 +27,9 @@ class Links(HTMLParser):
 
     def __init__(self):
         super().__init__()
-        self.tags, self.links, self.places = set(), [], set()
+        self.tags = set()
+        self.links = []
+        self.places = set()
 
     def handle_starttag(self, tag, attrs):
         given = dict(attrs)

@@ -36,9 +36,9 @@ class Motion:
         self.work, self.scratch = make_workspace(self.model), dynamics.make_scratch(self.model)
         self.work.tension[:] = robot.rest.tension
 
-    def advance(self, speed, duration, step=1e-3):
-        """Advance; returns (converged, residual, smallest step, iterations)."""
-        rule = dynamics.Rule(step, self.rho)
+    def advance(self, speed, duration, h=1e-3):
+        """Advance; returns (converged, residual, smallest internal step, iterations)."""
+        rule = dynamics.Rule(h, self.rho)
         return dynamics.advance(
             self.model, self.state, speed, duration, rule, self.weight, self.work, self.scratch
         )

@@ -95,8 +95,8 @@ def test_the_base_of_any_robot_bears_its_weight(robot):
         axis=0
     )  # of the base on the robot, negative
     for c in range(robot.n_cables):
-        h = robot.model.first_hole[c]
-        a, b = (robot.model.hole_weights[k] @ nodes[robot.model.hole_nodes[k]] for k in (h, h + 1))
+        hole = robot.model.first_hole[c]
+        a, b = (robot.model.hole_weights[k] @ nodes[robot.model.hole_nodes[k]] for k in (hole, hole + 1))
         force += found.tension[c] * (b - a) / np.linalg.norm(b - a)
     np.testing.assert_allclose(force, robot.weight.reshape(-1, 3).sum(axis=0), atol=1e-5)
 

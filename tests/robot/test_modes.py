@@ -61,7 +61,7 @@ def test_a_robot_pushed_along_a_mode_swings_at_its_frequency(name, number, reque
     shape, state = found.shape[:, number], dynamics.rest_state(bent.q, drive)
     state.v[FREE:] = 0.02 * shape / np.abs(shape).max()
     work, scratch, history = make_workspace(model), dynamics.make_scratch(model), []
-    rule = dynamics.Rule(step=0.005, rho=1.0)
+    rule = dynamics.Rule(h=0.005, rho=1.0)
     for _ in range(round(4.0 / found.frequency[number] / 0.02)):
         assert dynamics.advance(model, state, still, 0.02, rule, robot.weight, work, scratch)[0]
         history.append(shape @ mechanics.mass_times(model, state.q - bent.q))

@@ -28,8 +28,10 @@ def test_rings_and_apexes_take_the_nodes_that_their_rows_name():
         assert np.array_equal(apex, nodes[module.apex_row(i)])
         assert {module.module_of(row) for pair in module.rigid_bars(i) for row in pair} == {i}
     assert [name for name in module.node_names(2) if not module.is_ring_node(name)] == [
-        "base.apex", "m1.apex", "m2.apex",
-    ]  # fmt: skip
+        "base.apex",
+        "m1.apex",
+        "m2.apex",
+    ]
 
 
 def test_the_rows_of_all_rings_leave_out_base_and_apexes():

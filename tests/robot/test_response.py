@@ -67,7 +67,7 @@ class Bent:
         x.v[:] = v
         work, scratch = make_workspace(self.model), dynamics.make_scratch(self.model)
         before, out = self.outputs(self.rest.q, self.rest.tension), []
-        rule = dynamics.Rule(step=5e-4, rho=0.8)
+        rule = dynamics.Rule(h=5e-4, rho=0.8)
         for _ in range(steps):
             moved = dynamics.advance(self.model, x, speed, step, rule, self.robot.weight, work, scratch)
             assert moved[0]

@@ -142,7 +142,7 @@ def through(*holes: tuple[int, float]) -> str:
         ("name=a/b", "must match"),
         ("modules.mass_kg=1", "unknown key"),
     ],
-)  # fmt: skip
+)
 def test_robots_that_cannot_be_built_are_refused(override: str, words: str) -> None:
     message = problems_of(override)
     assert words in message
@@ -152,8 +152,10 @@ def test_robots_that_cannot_be_built_are_refused(override: str, words: str) -> N
 def test_all_disagreements_are_listed_at_once() -> None:
     message = problems_of("tip.ring=14", "stroke_mm=[1, 2]", "cables.routes.2.to_ring=99")
     assert [line.split(":")[0] for line in message.splitlines()] == [
-        "--set cables.routes.2.to_ring", "--set tip.ring", "--set stroke_mm",
-    ]  # fmt: skip
+        "--set cables.routes.2.to_ring",
+        "--set tip.ring",
+        "--set stroke_mm",
+    ]
 
 
 def test_robots_are_found_by_name_and_by_path(tmp_path: Path) -> None:

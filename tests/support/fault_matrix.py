@@ -20,10 +20,10 @@ from tcr_hardware.emulators.plc_program import PlcLimitSettings
 from tcr_hardware.modbus.registers import Control
 from tcrctl.errors import TcrctlError
 from tcrctl.loop.pacing import RealTime
-from tcrctl.plant.rig.bench import build_rig
+from tcrctl.plant.rig.assembly import build_rig
 from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigPlant
-from tcrctl.plant.rig.session import Session
 from tcrctl.plant.rig.settings import RigFile
 from tcrctl.robot.module import ring_rows
 from tcrctl.signals import Command
@@ -77,16 +77,29 @@ def harmless(name, *, cameras=None, plc=None):
 
 def blinding(name, **faults):
     return Case(
-        name, faults, connect="disarmed", armed="disarmed", moving="disarmed", stopping="disarmed",
-        says="usable measurement", rule="stale",
-    )  # fmt: skip
+        name,
+        faults,
+        connect="disarmed",
+        armed="disarmed",
+        moving="disarmed",
+        stopping="disarmed",
+        says="usable measurement",
+        rule="stale",
+    )
 
 
 def plc_lost(name, fault, says, **arguments):
     return Case(
-        name, plc=(fault, arguments), connect="disarmed", armed="faulted", moving="faulted", stopping="faulted",
-        says=says, rule="silence", exit_code=5,
-    )  # fmt: skip
+        name,
+        plc=(fault, arguments),
+        connect="disarmed",
+        armed="faulted",
+        moving="faulted",
+        stopping="faulted",
+        says=says,
+        rule="silence",
+        exit_code=5,
+    )
 
 
 NAMES = [f"m{ring}.n{node}" for ring in range(1, 6) for node in (1, 2, 3)]
@@ -171,7 +184,7 @@ class Outcome:
 
 
 @dataclass
-class Bench:
+class WatchedEmulators:
     """Both emulators, and everything that reaches the PLC."""
 
     robot: Any
@@ -211,22 +224,41 @@ class Bench:
 
     def loaded(self):
         cables = {f"c{i}": {"axis": i, "min_mm": -20, "max_mm": self.high_mm} for i in range(1, 5)}
-        rig = RigFile.model_validate_json(json.dumps({
-            "name": "matrix",
-            "cameras": {"kind": "natnet", "transport": "unicast", "command_port": self.motive.address[1]},
-            "robots": {"tcr5x4": {
-                "plc": {"kind": "modbus_tcp", "host": self.plc.address[0], "port": self.plc.address[1]},
-                "cables": cables,
-                "markers": {"labels": "m{ring}.n{node}"},
-            }},
-            "safety": {"max_step_mm": MAX_STEP_UM / 1e3, "following_mm": 2.0, "standstill_s": 0.4,
-                       "arm_timeout_s": 0.5, **self.rules},
-        }))  # fmt: skip
+        rig = RigFile.model_validate_json(
+            json.dumps(
+                {
+                    "name": "matrix",
+                    "cameras": {
+                        "kind": "natnet",
+                        "transport": "unicast",
+                        "command_port": self.motive.address[1],
+                    },
+                    "robots": {
+                        "tcr5x4": {
+                            "plc": {
+                                "kind": "modbus_tcp",
+                                "host": self.plc.address[0],
+                                "port": self.plc.address[1],
+                            },
+                            "cables": cables,
+                            "markers": {"labels": "m{ring}.n{node}"},
+                        }
+                    },
+                    "safety": {
+                        "max_step_mm": MAX_STEP_UM / 1e3,
+                        "following_mm": 2.0,
+                        "standstill_s": 0.4,
+                        "arm_timeout_s": 0.5,
+                        **self.rules,
+                    },
+                }
+            )
+        )
         return LoadedRig(rig, "tcr5x4", None, b"")
 
     def plant(self) -> RigPlant:
-        session = Session(time.monotonic, lambda *event: self.events.append(event), confirmed=True)
-        return build_rig(self.loaded(), self.robot, PERIOD, session)
+        operation = Operation(time.monotonic, lambda *event: self.events.append(event), confirmed=True)
+        return build_rig(self.loaded(), self.robot, PERIOD, operation)
 
     def fail(self, case: Case):
         if isinstance(case.cameras, tuple):
@@ -261,20 +293,20 @@ class Loop:
 
 def play(case: Case, phase: str, robot: Any, rules: dict[str, Any], watchdog_ms: int = 200) -> Outcome:
     """Let a fault happen in a phase."""
-    with Bench(robot, rules, watchdog_ms) as bench:
+    with WatchedEmulators(robot, rules, watchdog_ms) as emulators:
         if phase == "connect":
-            bench.fail(case)
+            emulators.fail(case)
         plant, error, begun = None, None, time.monotonic()
         decided = begun
         try:
-            plant = bench.plant()
+            plant = emulators.plant()
             plant.start()
             loop = Loop(plant)
             if phase in ("moving", "stopping"):
                 loop.run(BEFORE)
             begun = decided = time.monotonic()
             if phase != "connect":
-                bench.fail(case)
+                emulators.fail(case)
             if phase != "stopping":
                 harmless_case = case.phases()[phase] == "running"
                 loop.run(WATCHED if harmless_case else AFTER_END)
@@ -283,11 +315,15 @@ def play(case: Case, phase: str, robot: Any, rules: dict[str, Any], watchdog_ms:
         state = "disarmed" if plant is None else str(plant.supervisor.state)
         if plant is not None:
             error, state = _closed(plant, error, "" if phase == "stopping" else state)
-        moved = _moves(bench.plc)
+        moved = _moves(emulators.plc)
         return Outcome(
-            state, error, decided - begun, [text for kind, _, text in bench.events if kind == "supervisor"],
-            np.array(bench.sent).reshape(-1, 6), moved,
-        )  # fmt: skip
+            state,
+            error,
+            decided - begun,
+            [text for kind, _, text in emulators.events if kind == "supervisor"],
+            np.array(emulators.sent).reshape(-1, 6),
+            moved,
+        )
 
 
 def _closed(plant, error, state):

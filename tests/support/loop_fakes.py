@@ -82,9 +82,16 @@ class FakeEstimator:
         self.applied.append(applied)
         position = np.array([0.01 * k * PERIOD + self.offset.get(k, 0.0), 0.0, -0.5])
         return Estimate(
-            measured.t, np.zeros(12), np.zeros(12), measured.drive, np.full(CABLES, self.tension.get(k, 5.0)),
-            position, np.array([0.0, 0.0, 1.0]), np.zeros(12), k not in self.failing,
-        )  # fmt: skip
+            measured.t,
+            np.zeros(12),
+            np.zeros(12),
+            measured.drive,
+            np.full(CABLES, self.tension.get(k, 5.0)),
+            position,
+            np.array([0.0, 0.0, 1.0]),
+            np.zeros(12),
+            k not in self.failing,
+        )
 
 
 class FakeController:
@@ -101,7 +108,14 @@ class FakeController:
         self.references.append(reference)
         speed = np.full(CABLES, self.speeds.get(k, 1e-3 * k))
         info = ControlInfo(
-            k not in self.failing, 3, 1e-9, 1e-12, 5, np.zeros(CABLES, bool), np.full(CABLES, 5.0), np.zeros(3),
+            k not in self.failing,
+            3,
+            1e-9,
+            1e-12,
+            5,
+            np.zeros(CABLES, bool),
+            np.full(CABLES, 5.0),
+            np.zeros(3),
             "no solution found" if k in self.failing else "",
-        )  # fmt: skip
+        )
         return Command(speed, estimate.drive + PERIOD * speed), info

@@ -124,7 +124,7 @@ def undamped(model):
 
 
 def mass_times(model, v):
-    """M v (12 n_modules,) for v over all nodes."""
+    """M v (n_free,) for v over all nodes."""
     return np.einsum("nab,nb->na", model.mass, v[FREE:].reshape(-1, 12)).ravel()
 
 

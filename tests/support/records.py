@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from tcrctl.log.geometry import CableRoute, LogGeometry
+from tcrctl.log.geometry import CableHoles, LogGeometry
 from tcrctl.signals import (
     Command,
     ControlInfo,
@@ -34,7 +34,7 @@ def geometry(n_modules: int = 3, n_cables: int = 3) -> LogGeometry:
     """Straight cables through node 1, 2 or 3 of every ring; markers on every ring but the base."""
     rings = np.arange(n_modules + 1)
     routes = tuple(
-        CableRoute(
+        CableHoles(
             name=f"c{j + 1}",
             nodes=4 * rings[:, None] + np.arange(3),
             weights=np.tile(np.eye(3)[j % 3], (n_modules + 1, 1)),

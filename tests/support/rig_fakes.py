@@ -9,10 +9,10 @@ import numpy as np
 from support.loop_fakes import Clock
 from tcrctl.errors import DeviceError
 from tcrctl.plant.rig.devices import DriveControl, DriveStatus, Sighting
+from tcrctl.plant.rig.health import Rules
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
-from tcrctl.plant.rig.session import Session
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
-from tcrctl.plant.rig.sight import Rules
 from tcrctl.signals import RawFrame
 
 M, N = 3, 6
@@ -27,7 +27,7 @@ def envelope(**changes):
         names=("c1", "c2", "c3"),
         low=np.full(M, LOW),
         high=np.full(M, HIGH),
-        step=np.full(M, STEP),
+        change=np.full(M, STEP),
         speed=np.full(M, 50_000.0),
         acceleration=np.full(M, np.inf),
         groups=(AntagonistGroup((0, 1, 2), -15_000, 60_000),),
@@ -101,17 +101,17 @@ class FakeDrives:
         self.status_now = replace(self.status_now, **changes)
 
 
-class Bench:
+class FakeRig:
     """A rig plant on fakes, its events, and a loop that paces itself on the fake clock."""
 
     def __init__(self, *, confirmed=True, limits=None, rules=RULES, seen_share=0.3):
         self.clock = Clock()
         self.cameras, self.drives = FakeCameras(self.clock), FakeDrives(self.clock)
         self.events = []
-        session = Session(self.clock, lambda *event: self.events.append(event), confirmed)
+        operation = Operation(self.clock, lambda *event: self.events.append(event), confirmed)
         limits = RigLimits(limits or envelope(), rules, seen_share, N, N, arm_timeout=1.0)
         self.plant = RigPlant(
-            self.cameras, self.drives, limits, PERIOD, session, clock=self.clock, sleep=self.clock.sleep
+            self.cameras, self.drives, limits, PERIOD, operation, clock=self.clock, sleep=self.clock.sleep
         )
 
     @property

@@ -35,7 +35,8 @@ def grid(holes, n=161):
         flat = flat[np.hypot(flat[:, 0] - hole[0], flat[:, 1] - hole[1]) >= hole[2]]
     turn = np.linspace(0.0, 2.0 * math.pi, 400)
     rims = [
-        np.stack((h[0] + h[2] * np.cos(turn), h[1] + h[2] * np.sin(turn), 0.0 * turn), axis=1) for h in holes
+        np.stack((u + radius * np.cos(turn), v + radius * np.sin(turn), 0.0 * turn), axis=1)
+        for u, v, radius in holes
     ]
     return np.concatenate((flat, *rims))
 

@@ -17,20 +17,20 @@ from tcrctl.robot.equilibrium import equilibrium
 from tcrctl.workspace.ray import Limits, follow
 from tcrctl.workspace.workspace import directions, explore
 
-LIMITS = Limits(floor=0.5, ceiling=100.0, step=8e-3)
+LIMITS = Limits(floor=0.5, ceiling=100.0, spacing=8e-3)
 
 
 @pytest.mark.parametrize("i", range(4))
 def test_points_of_a_ray_are_equilibria_within_the_limits_and_the_next_one_is_none(tcr5x4, i):
     robot, direction = tcr5x4, directions(4, 4)[i]
     ray = follow(robot, direction, LIMITS)
-    steps = np.outer(np.arange(len(ray.drive)), LIMITS.step * direction / np.abs(direction).max())
+    steps = np.outer(np.arange(len(ray.drive)), LIMITS.spacing * direction / np.abs(direction).max())
     np.testing.assert_allclose(ray.drive, steps, atol=1e-12)
     assert np.all((robot.stroke[0] <= ray.drive) & (ray.drive <= robot.stroke[1]))
     assert ray.tension[1:].min(initial=np.inf) >= LIMITS.floor
     held = equilibrium(robot.model, ray.drive[-1], robot.weight, robot.rest.q)
     np.testing.assert_allclose(pose.position(held.q, robot.tip), ray.position[-1], atol=1e-5)
-    beyond = ray.drive[-1] + LIMITS.step * direction / np.abs(direction).max()
+    beyond = ray.drive[-1] + LIMITS.spacing * direction / np.abs(direction).max()
     if ray.end == "stroke":
         assert np.any((beyond < robot.stroke[0]) | (beyond > robot.stroke[1]))
     elif ray.end == "slack":
@@ -71,7 +71,7 @@ def test_the_workspace_is_the_same_however_many_processes_follow_it(tmp_path, ca
     robot = load_robot("tcr5x4")
     one, two = (explore(robot, 6, LIMITS, Engine(n), lambda done, total: None) for n in (1, 2))
     assert np.array_equal(one.offset, two.offset)
-    order = ["workspace", "tcr5x4", "--rays", "6", "--step-mm", "8", "--jobs", "1", "--out", str(tmp_path)]
+    order = ["workspace", "tcr5x4", "--rays", "6", "--spacing-mm", "8", "--jobs", "1", "--out", str(tmp_path)]
     assert main([*order, "--json"]) == 0
     made = json.loads(capsys.readouterr().out)
     assert made["points"] == len(one.tilt)

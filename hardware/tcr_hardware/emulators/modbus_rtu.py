@@ -93,7 +93,7 @@ class RtuPort:
 
 
 def request_length(start: bytes) -> int:
-    """Length of a request from its first bytes; 0 while it is not known."""
+    """Return the length of a request from its first bytes; 0 while it is not known."""
     if len(start) < 2:
         return 0
     if start[1] in COUNTED:
@@ -103,7 +103,7 @@ def request_length(start: bytes) -> int:
 
 
 def crc(data: bytes) -> bytes:
-    """CRC-16 of Modbus, low byte first ([MSL06], section 6.2.2)."""
+    """Return the CRC-16 of Modbus, low byte first ([MSL06], section 6.2.2)."""
     remainder = 0xFFFF
     for byte in data:
         remainder ^= byte
@@ -113,7 +113,7 @@ def crc(data: bytes) -> bytes:
 
 
 def _terminals() -> tuple[Callable[[int], Any], type[Exception]]:
-    """What makes a terminal raw, and the error it raises; looked for only here, because Windows has neither.
+    """Return what makes a terminal raw, and the error it raises; imported only here, as Windows has neither.
 
     Raises:
         HardwareError: This system has no terminals of this kind.
@@ -129,7 +129,7 @@ def _terminals() -> tuple[Callable[[int], Any], type[Exception]]:
 
 
 def _pseudo_terminal() -> tuple[int, int]:
-    """Both ends of a raw pseudo-terminal: ours, and the client's, kept open so that clients may come and go."""
+    """Open a raw pseudo-terminal; return our end and the client's, kept open so that clients may come and go."""
     make_raw, _ = _terminals()
     ours, theirs = os.openpty()
     make_raw(theirs)
@@ -137,7 +137,7 @@ def _pseudo_terminal() -> tuple[int, int]:
 
 
 def _open(device: str) -> int:
-    """A raw serial device.
+    """Open a raw serial device.
 
     Raises:
         HardwareError: It cannot be opened.

@@ -23,7 +23,7 @@ class Registers(Protocol):
     """What a server serves."""
 
     def read(self, address: int, count: int) -> list[int]:
-        """Registers (count,) from ``address`` on."""
+        """Read registers (count,) from ``address`` on."""
         ...
 
     def write(self, address: int, words: Sequence[int]) -> None:
@@ -44,7 +44,9 @@ class ModbusServer:
 
     def __init__(self, unit: int, registers: Registers, faults: PlcFaults) -> None:
         """Serve ``registers`` as ``unit``."""
-        self.unit, self._registers, self._faults = unit, registers, faults
+        self.unit = unit
+        self._registers = registers
+        self._faults = faults
         self._functions = {
             READ_HOLDING: self._read,
             WRITE_ONE: self._write_one,
@@ -76,7 +78,7 @@ class ModbusServer:
         return bytes([function | 0x80, code])
 
     def spoil(self, frame: bytes) -> bytes:
-        """A framed answer as it leaves the PLC."""
+        """Return a framed answer as it leaves the PLC."""
         if self._faults.take("corrupt") is not None:
             frame = frame[:-1] + bytes([frame[-1] ^ 0x10])
         if self._faults.take("truncate") is not None:

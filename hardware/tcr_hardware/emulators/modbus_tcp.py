@@ -102,7 +102,7 @@ class TcpPort:
 
 
 def _listen(address: tuple[str, int]) -> socket.socket:
-    """A listening socket.
+    """Open a listening socket.
 
     Raises:
         HardwareError: The address cannot be used.

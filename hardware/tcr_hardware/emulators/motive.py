@@ -19,9 +19,9 @@ from tcr_hardware.emulators import motive_encoder as encoder
 from tcr_hardware.emulators.motive_encoder import Stamp, Version
 from tcr_hardware.emulators.motive_faults import MotiveFaults
 from tcr_hardware.emulators.motive_link import Client, MotiveLink
+from tcr_hardware.emulators.motive_markers import TrackedMarkers, View
 from tcr_hardware.emulators.motive_outbox import Outbox
 from tcr_hardware.emulators.motive_requests import CLOCK_HZ, answer
-from tcr_hardware.emulators.motive_scene import Scene, View
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 
 FRAMEOFDATA, DISCONNECTBYTIMEOUT = 7, 11
@@ -36,7 +36,7 @@ class MotiveEmulator:
     Attributes:
         faults: What is wrong with it; change it at any time.
         settings: Settings.
-        scene: Names and bodies.
+        tracked: Names and bodies.
         version: Newest version served now.
         frames_sent: Frames taken while somebody listened; how many of them arrive is a matter of the faults.
         failure: What ended the stream, for instance an error of ``positions``; None while it runs.
@@ -53,7 +53,7 @@ class MotiveEmulator:
         self.faults = faults or MotiveFaults()
         self.version = _version(self.settings.version)
         self._positions = positions
-        self.scene = Scene(names, positions())
+        self.tracked = TrackedMarkers(names, positions())
         self.link = MotiveLink(self.settings)
         self._outbox = Outbox(self.settings.seed)
         self.frames_sent = 0
@@ -109,7 +109,7 @@ class MotiveEmulator:
     def change_models(self, names: Sequence[str]) -> None:
         """Track the same markers under other names, in the same order of rows."""
         with self._lock:
-            self.scene = Scene(names, self._positions())
+            self.tracked = TrackedMarkers(names, self._positions())
             self._models_flag = FLAGGED_FRAMES
 
     def change_version(self, version: str) -> None:
@@ -119,7 +119,7 @@ class MotiveEmulator:
             self.link.change_version(self.version, FLAGGED_FRAMES)
 
     def ticks(self, at: float) -> int:
-        """Server clock at a time of ``time.monotonic`` [s]."""
+        """Return the server's clock at a time of ``time.monotonic`` [s]."""
         return round((at + self._clock_offset) * (1.0 + self.settings.clock_drift) * CLOCK_HZ)
 
     def _begin(self, clock_offset: float) -> None:
@@ -157,9 +157,9 @@ class MotiveEmulator:
                 self.link.send(reply, client)
 
     def latest(self, version: Version) -> bytes:
-        """The scene now, as one FRAMEOFDATA packet."""
+        """Return the markers now, as one FRAMEOFDATA packet."""
         stamp, view = self._look(time.monotonic())
-        return encoder.packet(FRAMEOFDATA, encoder.frame(version, stamp, self.scene, view))
+        return encoder.packet(FRAMEOFDATA, encoder.frame(version, stamp, self.tracked, view))
 
     def _look(self, now: float) -> tuple[Stamp, View]:
         sent = now + self.settings.latency_s
@@ -174,7 +174,7 @@ class MotiveEmulator:
             sent - received,
             flags,
         )
-        return stamp, self.scene.view(self._positions(), self.faults)
+        return stamp, self.tracked.view(self._positions(), self.faults)
 
     def _expose(self, now: float) -> None:
         """Take one frame and put it into the outbox, for every listener in its version."""
@@ -201,7 +201,7 @@ class MotiveEmulator:
 
     def _encode(self, version: Version, flags: int, stamp: Stamp, view: View) -> bytes:
         flagged = replace(stamp, params=stamp.params | flags)
-        return encoder.packet(FRAMEOFDATA, encoder.frame(version, flagged, self.scene, view))
+        return encoder.packet(FRAMEOFDATA, encoder.frame(version, flagged, self.tracked, view))
 
     def _bitstream(self, listener: Client) -> int:
         if listener.flagged <= 0:

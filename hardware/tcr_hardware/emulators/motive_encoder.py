@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tcr_hardware.emulators.motive_scene import UNLABELLED, Scene, View
+from tcr_hardware.emulators.motive_markers import UNLABELLED, TrackedMarkers, View
 
 Version = tuple[int, int]
 
@@ -46,19 +46,19 @@ def packet(message: int, payload: bytes = b"") -> bytes:
 
 
 def text(value: str) -> bytes:
-    """A name with its closing zero."""
+    """Encode a name with its closing zero."""
     return value.encode() + b"\0"
 
 
 def sender(name: str, version: Version) -> bytes:
-    """Who we are; behind the name lies garbage, as in the real thing."""
+    """Encode who we are; behind the name lies garbage, as in the real thing."""
     return text(name).ljust(256, b"\xcd") + bytes((3, 1, 0, 0)) + bytes((*version, 0, 0))
 
 
 def server_info(
     name: str, version: Version, clock_hz: int, data_port: int, multicast: bool, group: str
 ) -> bytes:
-    """Payload of SERVERINFO."""
+    """Encode the payload of SERVERINFO."""
     if version < (3, 0):
         return sender(name, version)
     address = bytes(int(part) for part in group.split("."))
@@ -66,7 +66,7 @@ def server_info(
 
 
 def _section(version: Version, count: int, content: bytes = b"") -> bytes:
-    """Count, from 4.1 size, and elements."""
+    """Encode count, from 4.1 size, and elements."""
     if version >= (4, 1):
         return struct.pack("<ii", count, len(content)) + content
     return struct.pack("<i", count) + content
@@ -76,18 +76,18 @@ def _points(positions: NDArray[np.float64]) -> bytes:
     return positions.astype("<f4").tobytes()
 
 
-def _sets(version: Version, scene: Scene, view: View) -> bytes:
-    sets = [(body.name, view.in_sets[body.rows]) for body in scene.bodies] + [("all", view.in_sets)]
+def _sets(version: Version, tracked: TrackedMarkers, view: View) -> bytes:
+    sets = [(body.name, view.in_sets[body.rows]) for body in tracked.bodies] + [("all", view.in_sets)]
     out = [text(name) + struct.pack("<i", len(points)) + _points(points) for name, points in sets]
     return _section(version, len(out), b"".join(out))
 
 
-def _bodies(version: Version, scene: Scene, view: View) -> bytes:
+def _bodies(version: Version, tracked: TrackedMarkers, view: View) -> bytes:
     out = []
     poses = zip(
         view.body_positions.tolist(), view.body_orientations.tolist(), view.body_tracked.tolist(), strict=True
     )
-    for body, (position, orientation, tracked) in zip(scene.bodies, poses, strict=True):
+    for body, (position, orientation, is_tracked) in zip(tracked.bodies, poses, strict=True):
         content = struct.pack("<i3f4f", body.id, *position, *orientation)
         if version < (3, 0):
             n = len(body.rows)
@@ -95,7 +95,7 @@ def _bodies(version: Version, scene: Scene, view: View) -> bytes:
             content += struct.pack("<i", n) + _points(view.in_sets[body.rows])
             content += struct.pack(f"<{n}i{n}f", *ids, *sizes)
         content += struct.pack("<f", RESIDUAL)
-        out.append(content + struct.pack("<h", tracked) if version >= (2, 6) else content)
+        out.append(content + struct.pack("<h", is_tracked) if version >= (2, 6) else content)
     return _section(version, len(out), b"".join(out))
 
 
@@ -131,13 +131,13 @@ def _suffix(version: Version, stamp: Stamp) -> bytes:
     return out + struct.pack("<i", 0)
 
 
-def frame(version: Version, stamp: Stamp, scene: Scene, view: View) -> bytes:
-    """Payload of FRAMEOFDATA."""
+def frame(version: Version, stamp: Stamp, tracked: TrackedMarkers, view: View) -> bytes:
+    """Encode the payload of FRAMEOFDATA."""
     out = [
         struct.pack("<i", stamp.number),
-        _sets(version, scene, view),
+        _sets(version, tracked, view),
         _section(version, len(view.unlabelled), _points(view.unlabelled)),
-        _bodies(version, scene, view),
+        _bodies(version, tracked, view),
         _section(version, 0),  # skeletons
     ]
     if version >= (4, 1):
@@ -150,14 +150,14 @@ def frame(version: Version, stamp: Stamp, scene: Scene, view: View) -> bytes:
     return b"".join([*out, _suffix(version, stamp)])
 
 
-def models(version: Version, scene: Scene) -> bytes:
-    """Payload of MODELDEF: a marker set and a rigid body for every body, the set of all, one camera from 3.0 on."""
+def models(version: Version, tracked: TrackedMarkers) -> bytes:
+    """Encode MODELDEF: a marker set and a rigid body for every body, the set of all, one camera from 3.0 on."""
     out = []
-    for body in scene.bodies:
+    for body in tracked.bodies:
         out.append((0, _set_description(body.name, body.markers)))
-        offsets = scene.rest[body.rows] - scene.rest[body.rows].mean(axis=0)
+        offsets = tracked.rest[body.rows] - tracked.rest[body.rows].mean(axis=0)
         out.append((1, _body_description(version, body.name, body.id, body.markers, offsets)))
-    out.append((0, _set_description("all", scene.names)))
+    out.append((0, _set_description("all", tracked.names)))
     if version >= (3, 0):
         out.append((5, text("Camera #1") + struct.pack("<3f4f", 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)))
     described = []

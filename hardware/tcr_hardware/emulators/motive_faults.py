@@ -26,7 +26,7 @@ class MotiveFaults:
         missing: Markers that are not seen and not listed.
         nan: Markers at no position at all.
         swap: Pairs of markers whose labels are exchanged.
-        offset_m: The whole scene jumps by this [m].
+        offset_m: All markers jump by this [m].
     """
 
     loss: float = 0.0

@@ -53,7 +53,7 @@ class MotiveLink:
         return host, port
 
     def listeners(self, version: Version) -> list[tuple[Address, Client]]:
-        """Where frames go, and to whom."""
+        """Return where frames go, and to whom."""
         if self._group is not None:
             self._everybody.version = version
             return [((self.settings.group, self.settings.data_port), self._everybody)]

@@ -33,7 +33,7 @@ class Outbox:
             heapq.heappush(self._waiting, (at, next(self._count), damaged, destination))
 
     def next_due(self) -> float:
-        """When the next datagram leaves [s]; infinity if none waits."""
+        """Return when the next datagram leaves [s]; infinity if none waits."""
         return self._waiting[0][0] if self._waiting else float("inf")
 
     def flush(self, now: float, send: Callable[[bytes, Address], None]) -> None:

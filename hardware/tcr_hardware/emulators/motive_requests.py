@@ -9,7 +9,7 @@ from typing import Protocol
 from tcr_hardware.emulators import motive_encoder as encoder
 from tcr_hardware.emulators.motive_encoder import Version
 from tcr_hardware.emulators.motive_link import MotiveLink
-from tcr_hardware.emulators.motive_scene import Scene
+from tcr_hardware.emulators.motive_markers import TrackedMarkers
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 
 NAME = "Motive (emulated)"
@@ -26,27 +26,27 @@ class Server(Protocol):
 
     Attributes:
         settings: Settings of the server.
-        scene: Names and bodies.
+        tracked: Names and bodies.
         version: Newest version served now.
         link: Who is connected.
     """
 
     settings: MotiveSettings
-    scene: Scene
+    tracked: TrackedMarkers
     version: Version
     link: MotiveLink
 
     def ticks(self, at: float) -> int:
-        """Server clock at a time of ``time.monotonic`` [s]."""
+        """Return the server's clock at a time of ``time.monotonic`` [s]."""
         ...
 
     def latest(self, version: Version) -> bytes:
-        """The scene now, as one FRAMEOFDATA packet."""
+        """Return the markers now, as one FRAMEOFDATA packet."""
         ...
 
 
 def answer(server: Server, datagram: bytes, address: tuple[str, int]) -> list[bytes]:
-    """Answers to one request, possibly none."""
+    """Return the answers to one request, possibly none."""
     if len(datagram) < 4:
         return []
     message = int.from_bytes(datagram[:2], "little")
@@ -60,7 +60,7 @@ def answer(server: Server, datagram: bytes, address: tuple[str, int]) -> list[by
     if message == REQUEST:
         return [_request(server, payload, address)]
     if message == REQUEST_MODELDEF:
-        return [encoder.packet(MODELDEF, encoder.models(version, server.scene))]
+        return [encoder.packet(MODELDEF, encoder.models(version, server.tracked))]
     if message == REQUEST_FRAMEOFDATA:
         return [server.latest(version)]
     if message == ECHOREQUEST and len(payload) >= 8 and server.version >= (3, 0):

@@ -143,7 +143,7 @@ class PlcEmulator:
         self._ticker = self._tcp = self._rtu = None
 
     def positions_um(self) -> tuple[float, ...]:
-        """Cable taken in by every drive now (axes,) [um], independent of where the PLC has its zero."""
+        """Return the cable taken in by every drive now (axes,) [um], independent of where the PLC has its zero."""
         with self._lock:
             self._advance()
             return tuple(servo.output for servo in self._program.servos)
@@ -163,7 +163,7 @@ class PlcEmulator:
         self.faults.clear("estop")
 
     def restart(self) -> None:
-        """Power cycle: connections are reset, registers are 0, nothing is enabled."""
+        """Cycle the power: connections are reset, registers are 0, nothing is enabled."""
         with self._lock:
             self._advance()
             self._image.clear()
@@ -172,7 +172,7 @@ class PlcEmulator:
             self._tcp.reset()
 
     def snapshot(self) -> dict[str, object]:
-        """State for people and tests."""
+        """Return the state for people and tests."""
         with self._lock:
             self._advance()
             program = self._program
@@ -189,7 +189,7 @@ class PlcEmulator:
             }
 
     def read(self, address: int, count: int) -> list[int]:
-        """Registers (count,) as a client reads them now."""
+        """Read registers (count,) as a client would now."""
         with self._lock:
             self._advance()
             return self._image.read(address, count)
@@ -222,8 +222,10 @@ class PlcEmulator:
                 self._advance()
 
     def _values(self, block: str) -> Values:
-        """Values of a read-only block by name."""
-        program, limits, axes = self._program, self._settings.limits, self._settings.axes
+        """Return the values of a read-only block by name."""
+        program = self._program
+        limits = self._settings.limits
+        axes = self._settings.axes
         if block == "status":
             slack = self._tensions_known and min(self._tensions) < SLACK_N
             return {

@@ -23,30 +23,34 @@ class FaultKind:
     arguments: Mapping[str, float | None] = field(default_factory=dict)
 
 
-FAULTS: Mapping[str, FaultKind] = MappingProxyType({
-    "exception": FaultKind(
-        "answers with a Modbus exception", {"code": 4, "function": None, "count": None}
-    ),
-    "silence": FaultKind("takes no notice of requests", {"count": None}),
-    "delay": FaultKind("carries requests out in time, answers late, in order", {"seconds": 0.1, "count": None}),
-    "wrong_echo": FaultKind(
-        "confirms writes at a wrong address (function 23: reads one register too few)", {"count": None}
-    ),
-    "corrupt": FaultKind("flips a bit of its answers (RTU: the CRC is wrong)", {"count": None}),
-    "truncate": FaultKind("sends half of its answers", {"count": None}),
-    "reset": FaultKind("resets its TCP connections, once"),
-    "refuse": FaultKind("refuses TCP connections"),
-    "word_swap": FaultKind("exchanges the words of all 32-bit registers"),
-    "wrong_magic": FaultKind("is another device"),
-    "wrong_version": FaultKind("has another version of the map"),
-    "freeze_ack": FaultKind("SEQ_ACK stands still"),
-    "freeze_heartbeat": FaultKind("HB_ECHO stands still"),
-    "freeze_program": FaultKind("the program hangs, Modbus still answers"),
-    "estop": FaultKind("the e-stop button is pressed"),
-    "drive": FaultKind("the field bus to the drives is down"),
-    "jam": FaultKind("the shaft of an axis does not move", {"axis": 1}),
-    "restart": FaultKind("power cycle, once"),
-})  # fmt: skip
+FAULTS: Mapping[str, FaultKind] = MappingProxyType(
+    {
+        "exception": FaultKind(
+            "answers with a Modbus exception", {"code": 4, "function": None, "count": None}
+        ),
+        "silence": FaultKind("takes no notice of requests", {"count": None}),
+        "delay": FaultKind(
+            "carries requests out in time, answers late, in order", {"seconds": 0.1, "count": None}
+        ),
+        "wrong_echo": FaultKind(
+            "confirms writes at a wrong address (function 23: reads one register too few)", {"count": None}
+        ),
+        "corrupt": FaultKind("flips a bit of its answers (RTU: the CRC is wrong)", {"count": None}),
+        "truncate": FaultKind("sends half of its answers", {"count": None}),
+        "reset": FaultKind("resets its TCP connections, once"),
+        "refuse": FaultKind("refuses TCP connections"),
+        "word_swap": FaultKind("exchanges the words of all 32-bit registers"),
+        "wrong_magic": FaultKind("is another device"),
+        "wrong_version": FaultKind("has another version of the map"),
+        "freeze_ack": FaultKind("SEQ_ACK stands still"),
+        "freeze_heartbeat": FaultKind("HB_ECHO stands still"),
+        "freeze_program": FaultKind("the program hangs, Modbus still answers"),
+        "estop": FaultKind("the e-stop button is pressed"),
+        "drive": FaultKind("the field bus to the drives is down"),
+        "jam": FaultKind("the shaft of an axis does not move", {"axis": 1}),
+        "restart": FaultKind("power cycle, once"),
+    }
+)
 
 
 class UnknownFaultError(HardwareError):
@@ -113,11 +117,11 @@ class PlcFaults:
             self._on_change(known, False)
 
     def get(self, name: str) -> dict[str, float | None] | None:
-        """Arguments of a fault if it is set."""
+        """Return the arguments of a fault if it is set."""
         return self._active.get(name)
 
     def take(self, name: str) -> dict[str, float | None] | None:
-        """Arguments of a fault if it is set; one answer less is left of a fault with a ``count``."""
+        """Return a fault's arguments if it is set, and use up one answer of one with a ``count``."""
         with self._lock:
             arguments = self._active.get(name)
             if arguments is None:

@@ -34,7 +34,10 @@ class PlcImage:
             faults: Faults that show in registers.
             values: Values of a read-only block by name, now.
         """
-        self._map, self._low_first, self._faults, self._values = rows, low_first, faults, values
+        self._map = rows
+        self._low_first = low_first
+        self._faults = faults
+        self._values = values
         self._first, count = rows.span("command")
         self._command = [0] * count
         self._frozen: dict[str, Sequence[float]] = {}
@@ -44,7 +47,7 @@ class PlcImage:
         self._command = [0] * len(self._command)
 
     def read(self, address: int, count: int) -> list[int]:
-        """Registers (count,) from ``address`` on; gaps within a block read 0.
+        """Read registers (count,) from ``address`` on; gaps within a block read 0.
 
         Raises:
             IllegalAddressError: A register lies in no block.
@@ -71,11 +74,11 @@ class PlcImage:
         self._command[start : start + len(words)] = words
 
     def command(self) -> dict[str, list[float]]:
-        """Values of the command registers by name, as the program reads them."""
+        """Return the values of the command registers by name, as the program reads them."""
         return {row.name: self._decode(row) for row in self._map.block("command")}
 
     def _block(self, block: str) -> dict[int, int]:
-        """Registers of a block by address."""
+        """Return registers of a block by address."""
         if block == "command":
             return dict(enumerate(self._command, start=self._first))
         values = self._with_faults(self._values(block))
@@ -86,7 +89,7 @@ class PlcImage:
         return words
 
     def _with_faults(self, values: Values) -> Values:
-        """Values as the faults distort them."""
+        """Return the values as the faults distort them."""
         shown = dict(values)
         for fault, name in (("freeze_ack", "SEQ_ACK"), ("freeze_heartbeat", "HB_ECHO")):
             if name in shown and self._faults.get(fault) is not None:
@@ -125,5 +128,5 @@ class PlcImage:
 
 
 def identity() -> dict[str, tuple[float, ...]]:
-    """Registers by which a client knows this map."""
+    """Return registers by which a client knows this map."""
     return {"MAGIC": (MAGIC,), "MAP_VERSION": (MAP_VERSION,), "ORDER_PROBE": (ORDER_PROBE,)}

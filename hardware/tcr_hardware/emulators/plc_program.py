@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tcr_hardware.modbus.registers import Control, Fault, Reject, Status
+from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status
 from tcr_hardware.servo import Servo, ServoSettings
 
 #: Set-points are spread over the time between the last two sets, within these bounds [s].
@@ -107,18 +107,18 @@ class PlcProgram:
         self.cycle = self.seq_ack = self.heartbeat_echo = 0
         self._seq_seen, self._silence_s, self._since_set_s = 0, 0.0, LONGEST_INTERVAL_S
         self._control = Control(0)
-        self.fault, self.watchdog, self.following_error, self._tripped = Fault.NONE, False, False, False
+        self.fault, self.watchdog, self.following_error, self._tripped = FaultCode.NONE, False, False, False
         self.enabled = self.stopping = self._following = self.limited = False
         self.reject = (Reject.NONE, 0)
         self.active = self.positions()
         self._target, self._speed, self._time_left_s = list(self.active), [0.0] * len(self.servos), 0.0
 
     def positions(self) -> list[float]:
-        """Positions reported (axes,), since tension zero [um]."""
+        """Return the positions reported (axes,), since tension zero [um]."""
         return [servo.position - origin for servo, origin in zip(self.servos, self._origin, strict=True)]
 
     def status(self) -> Status:
-        """Status bits."""
+        """Return the status bits."""
         at_rest = all(
             abs(active - at) <= IN_POSITION_UM
             for active, at in zip(self.active, self.positions(), strict=True)
@@ -127,7 +127,7 @@ class PlcProgram:
             (Status.READY, self._ready()),
             (Status.ZEROED, self.zeroed),
             (Status.ENABLED, self.enabled),
-            (Status.FAULT, self.fault is not Fault.NONE),
+            (Status.FAULT, self.fault is not FaultCode.NONE),
             (Status.ESTOP, self.estop),
             (Status.STOPPING, self.stopping),
             (Status.FOLLOWING_ERROR, self.following_error),
@@ -140,7 +140,7 @@ class PlcProgram:
         return Status(sum(bit for bit, is_set in bits if is_set))
 
     def scan(self, command: PlcCommand, dt: float) -> None:
-        """One cycle of the program, ``dt`` [s] after the last."""
+        """Do one cycle of the program, ``dt`` [s] after the last."""
         self.cycle = (self.cycle + 1) & 0xFFFF
         rising = command.control & ~self._control
         self._control = command.control
@@ -159,34 +159,34 @@ class PlcProgram:
         self.coast(dt)
 
     def coast(self, dt: float) -> None:
-        """Time passes for the drives alone: they follow their last set-points, also while the program hangs."""
+        """Let time pass for the drives alone: they follow their last set-points, also while the program hangs."""
         for servo, active, origin in zip(self.servos, self.active, self._origin, strict=True):
-            servo.step(active + origin, dt)
+            servo.advance(active + origin, dt)
 
     def _watch(self, command: PlcCommand, dt: float) -> None:
-        """Watchdog: the host has to change HEARTBEAT while operation is enabled."""
+        """Watch that the host changes HEARTBEAT while operation is enabled."""
         alive = command.heartbeat != self.heartbeat_echo
         self.heartbeat_echo = command.heartbeat
         self._silence_s = 0.0 if alive else self._silence_s + dt
         if self.enabled and 1e3 * self._silence_s >= self._limits.watchdog_ms:
             self.watchdog = True
-            self._trip(Fault.WATCHDOG)
+            self._trip(FaultCode.WATCHDOG)
 
     def _find_faults(self) -> None:
-        """Faults of the machine itself."""
+        """Look for faults of the machine itself."""
         if self.estop:
-            self._trip(Fault.ESTOP)
+            self._trip(FaultCode.ESTOP)
         if self.drive_lost:
-            self._trip(Fault.DRIVE)
+            self._trip(FaultCode.DRIVE)
         for axis, at in enumerate(self.positions()):
             if abs(self.active[axis] - at) > self._limits.following_um:
                 self.following_error = True
                 self.active[axis], self._speed[axis] = at, 0.0  # no jump when the axis comes free
-                self._trip(Fault.FOLLOWING_ERROR)
+                self._trip(FaultCode.FOLLOWING_ERROR)
 
-    def _trip(self, fault: Fault) -> None:
+    def _trip(self, fault: FaultCode) -> None:
         """Latch a fault, which stops; the first fault stays the one reported."""
-        if self.fault is Fault.NONE:
+        if self.fault is FaultCode.NONE:
             self.fault = fault
         self._tripped = True
 
@@ -198,7 +198,7 @@ class PlcProgram:
     def _reset(self) -> None:
         """Acknowledge a fault, once its cause is gone and everything stands."""
         if not (self.estop or self.drive_lost or self._moving()):
-            self.fault, self.watchdog, self.following_error = Fault.NONE, False, False
+            self.fault, self.watchdog, self.following_error = FaultCode.NONE, False, False
 
     def _zero(self) -> None:
         """Take the present positions as zero."""
@@ -209,8 +209,8 @@ class PlcProgram:
         self._target, self.zeroed = list(self.active), True
 
     def _ready(self) -> bool:
-        """Whether an ENABLE edge would be obeyed, given RUN."""
-        return self.fault is Fault.NONE and self.zeroed and not self.stopping
+        """Tell whether an ENABLE edge would be obeyed, given RUN."""
+        return self.fault is FaultCode.NONE and self.zeroed and not self.stopping
 
     def _permit(self, command: PlcCommand, rising: Control) -> None:
         """Enable on the edge, with the set-points that the drives hold already; stop without ENABLE or RUN."""
@@ -238,7 +238,7 @@ class PlcProgram:
         self._since_set_s = 0.0
 
     def _verdict(self, command: PlcCommand) -> tuple[Reject, int]:
-        """Whether a set may be taken; without FOLLOW its set-points do not matter."""
+        """Tell whether a set may be taken; without FOLLOW its set-points do not matter."""
         if Control.FOLLOW not in command.control:
             return Reject.NONE, 0
         if self.estop:
@@ -285,7 +285,7 @@ class PlcProgram:
         self.stopping = self.stopping and self._moving()
 
     def _moving(self) -> bool:
-        """Whether a set-point of the drives moves."""
+        """Tell whether a set-point of the drives moves."""
         return any(self._speed)
 
 

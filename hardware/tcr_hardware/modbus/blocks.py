@@ -24,11 +24,11 @@ class Counters:
     heartbeat: int = 0
 
     def next_block(self) -> Counters:
-        """Counters of the next set of set-points, before it is written."""
+        """Return the counters of the next set of set-points, before it is written."""
         return Counters((self.seq + 1) & 0xFFFF, self.heartbeat)
 
     def next_write(self) -> Counters:
-        """Counters of the next write of the same set."""
+        """Return the counters of the next write of the same set."""
         return Counters(self.seq, (self.heartbeat + 1) & 0xFFFF)
 
 
@@ -47,7 +47,7 @@ class Blocks:
     def command(
         self, counters: Counters, setpoints_um: Sequence[int], control: Control, vmax_um_s: int
     ) -> list[int]:
-        """Registers of a command block.
+        """Return registers of a command block.
 
         Raises:
             SetpointError: A value does not fit into its register.
@@ -66,14 +66,14 @@ class Blocks:
         return [word for row in rows for word in self.codec.encode(row, values[row.name])]
 
     def counters(self, words: Sequence[int]) -> Counters:
-        """Counters that the command block of the PLC holds."""
+        """Return the counters that the command block of the PLC holds."""
         values = self._values("command", words)
         return Counters(int(values["SEQ"][0]), int(values["HEARTBEAT"][0]))
 
     def status(
         self, words: Sequence[int], counters: Counters, now: float, began: float, attempts: int
     ) -> PlcStatus:
-        """Status block as a record.
+        """Return the status block as a record.
 
         Args:
             words: Its registers.
@@ -101,12 +101,12 @@ class Blocks:
         )
 
     def slow(self, words: Sequence[int]) -> PlcSlow:
-        """Slow status as a record."""
+        """Return the slow status as a record."""
         values = self._values("slow", words)
         return PlcSlow(_micrometres("SP_ACTIVE", values["SP_ACTIVE"]), values["LOAD"])
 
     def limits(self, words: Sequence[int]) -> PlcLimits:
-        """Limits as a record.
+        """Return the limits as a record.
 
         Raises:
             PlcMismatchError: A stroke is empty.
@@ -120,7 +120,7 @@ class Blocks:
         return PlcLimits(int(values["WD_MS"][0]), lows, highs, speed, step)
 
     def _values(self, block: str, words: Sequence[int]) -> dict[str, tuple[float, ...]]:
-        """Values of a block by name."""
+        """Return the values of a block by name."""
         return {
             row.name: self.codec.decode(row, _registers(self.map, row, words))
             for row in self.map.block(block)
@@ -156,13 +156,13 @@ def identify(rows: RegisterMap, words: Sequence[int], word_order: str, byte_orde
 
 
 def _registers(rows: RegisterMap, row: Register, words: Sequence[int]) -> Sequence[int]:
-    """Registers of one quantity within those of its block."""
+    """Return registers of one quantity within those of its block."""
     first = rows.span(row.block)[0]
     return words[row.address - first : row.end - first]
 
 
 def _micrometres(name: str, values: Sequence[float]) -> tuple[int, ...]:
-    """Whole micrometres.
+    """Round to whole micrometres.
 
     Raises:
         PlcMismatchError: A float register holds no finite number.
@@ -174,5 +174,5 @@ def _micrometres(name: str, values: Sequence[float]) -> tuple[int, ...]:
 
 
 def _reason(code: int) -> Reject:
-    """Reason of a refusal; a code that only a newer PLC program knows still counts as one."""
+    """Return the reason of a refusal; a code that only a newer PLC program knows still counts as one."""
     return Reject(code) if code in set(Reject) else Reject.RANGE

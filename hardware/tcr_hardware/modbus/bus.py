@@ -70,7 +70,9 @@ class PlcBus:
         probe = self._map["MAGIC"].address
         self._link = ModbusLink(settings.link, settings.unit, settings.timeout_s, probe, dial)
         self._one_request = settings.exchange != "fc16_fc3"
-        self._blocks, self._counters, self._liveness = Blocks(self._map, WordCodec()), Counters(), Liveness()
+        self._blocks = Blocks(self._map, WordCodec())
+        self._counters = Counters()
+        self._liveness = Liveness()
         self._info: PlcInfo | None = None
         self._is_open = False  # stays so while a lost connection waits for its next attempt
         self.statistics = BusStatistics()
@@ -129,7 +131,7 @@ class PlcBus:
         self._link.close()
 
     def check_period(self, period_s: float) -> float:
-        """Share of a control period that one exchange takes on the wire; 0 for TCP. Needs an open bus.
+        """Return the share of a control period that one exchange takes on the wire; 0 for TCP. Needs an open bus.
 
         Raises:
             RateError: The period is too short for the line, or for the watchdog of the PLC.
@@ -168,14 +170,14 @@ class PlcBus:
     def _cycle(
         self, setpoints_um: Sequence[int], control: Control, vmax_um_s: int, attempt: int
     ) -> PlcStatus:
-        """One attempt of an exchange."""
+        """Attempt an exchange once."""
         self._counters = self._counters.next_write()
         block = self._blocks.command(self._counters, setpoints_um, control, vmax_um_s)
         began = time.monotonic()
         return self._judged(self._status(self._send(block), began, attempt), wrote=True)
 
     def _look(self, attempt: int) -> PlcStatus:
-        """One attempt to read the state."""
+        """Attempt to read the state once."""
         began = time.monotonic()
         return self._judged(self._status(self._read("status"), began, attempt), wrote=False)
 
@@ -227,7 +229,7 @@ class PlcBus:
             raise
 
     def _identify(self) -> WordCodec:
-        """Word and byte order of the PLC."""
+        """Return the word and byte order of the PLC."""
         return identify(self._map, self._read("slow"), self._settings.word_order, self._settings.byte_order)
 
     def _read(self, block: str) -> list[int]:
@@ -237,7 +239,7 @@ class PlcBus:
         return self._blocks.status(words, self._counters, time.monotonic(), began, attempt)
 
     def _judged(self, status: PlcStatus, *, wrote: bool) -> PlcStatus:
-        """An answer, if it can be true."""
+        """Return an answer if it can be true."""
         limits = self.info.limits
         strokes = zip(limits.min_um, limits.max_um, strict=True)
         for axis, (at, (lowest, highest)) in enumerate(zip(status.positions_um, strokes, strict=True), 1):

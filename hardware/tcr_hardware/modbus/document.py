@@ -11,7 +11,7 @@ from enum import IntEnum, IntFlag
 from tcr_hardware.modbus.registers import (
     MAP_VERSION,
     Control,
-    Fault,
+    FaultCode,
     Register,
     RegisterMap,
     Reject,
@@ -56,11 +56,11 @@ REJECT = {
     Reject.ESTOP: "estop: the e-stop is pressed",
 }
 FAULT = {
-    Fault.NONE: "none",
-    Fault.WATCHDOG: "watchdog: `HEARTBEAT` did not change within `WD_MS` while operation was enabled",
-    Fault.ESTOP: "estop: the e-stop was pressed",
-    Fault.FOLLOWING_ERROR: "following error",
-    Fault.DRIVE: "drive: the field bus to the drives was down",
+    FaultCode.NONE: "none",
+    FaultCode.WATCHDOG: "watchdog: `HEARTBEAT` did not change within `WD_MS` while operation was enabled",
+    FaultCode.ESTOP: "estop: the e-stop was pressed",
+    FaultCode.FOLLOWING_ERROR: "following error",
+    FaultCode.DRIVE: "drive: the field bus to the drives was down",
 }
 RULES = """\
 # Register map
@@ -90,7 +90,7 @@ since tension zero; positive pulls.
 
 
 def register_map_markdown(rows: RegisterMap) -> str:
-    """The document of a register map."""
+    """Write the document of a register map."""
     parts = [RULES.format(version=MAP_VERSION, axes=rows.axes)]
     for block, title in BLOCKS.items():
         first, count = rows.span(block)
@@ -109,7 +109,7 @@ def register_map_markdown(rows: RegisterMap) -> str:
 
 
 def _row(row: Register) -> tuple[str, ...]:
-    """One quantity as a row of a table."""
+    """Write one quantity as a row of a table."""
     address = f"{row.address}" if row.words == 1 else f"{row.address} .. {row.end - 1}"
     kind = row.kind if row.count == 1 else f"{row.count} x {row.kind}"
     unit = row.unit if row.scale == 1.0 or not row.unit else f"{row.scale:g} {row.unit}"
@@ -127,7 +127,7 @@ def _value(item: tuple[IntEnum, str]) -> tuple[str, ...]:
 
 
 def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """A Markdown table."""
+    """Write a Markdown table."""
     lines = [head, ("---",) * len(head), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 

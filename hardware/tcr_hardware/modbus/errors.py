@@ -67,7 +67,9 @@ class PlcMismatchError(HardwareError):
 
     def __init__(self, register: str, found: str, expected: str, *, hint: str = "") -> None:
         super().__init__(f"{register} reads {found}, expected {expected}", hint=hint)
-        self.register, self.found, self.expected = register, found, expected
+        self.register = register
+        self.found = found
+        self.expected = expected
 
 
 class LinkError(HardwareError):
@@ -123,7 +125,9 @@ class StaleAnswerError(LinkError):
             f"{register} echoes {echoed}, sent last was {sent}: an answer of an earlier request, "
             "or another master writes to this PLC"
         )
-        self.register, self.sent, self.echoed = register, sent, echoed
+        self.register = register
+        self.sent = sent
+        self.echoed = echoed
 
 
 class PlcExceptionError(HardwareError):
@@ -138,7 +142,9 @@ class PlcExceptionError(HardwareError):
     def __init__(self, code: int, function: int, what: str) -> None:
         name = EXCEPTION_NAMES.get(code, "unknown code")
         super().__init__(f"the PLC refused to {what}: exception {code} ({name}), function {function}")
-        self.code, self.name, self.function = code, name, function
+        self.code = code
+        self.name = name
+        self.function = function
 
 
 class PlcFrozenError(HardwareError):
@@ -154,7 +160,9 @@ class PlcFrozenError(HardwareError):
         super().__init__(
             f"{register} stands at {value} for {1e3 * age_s:.0f} ms: the PLC program does not run"
         )
-        self.register, self.value, self.age_s = register, value, age_s
+        self.register = register
+        self.value = value
+        self.age_s = age_s
 
 
 class ImplausibleAnswerError(HardwareError):
@@ -171,4 +179,6 @@ class ImplausibleAnswerError(HardwareError):
             f"axis {axis} reports {value_um} um, its stroke is {limits_um[0]} .. {limits_um[1]} um",
             hint="Has the word order of the PLC changed?",
         )
-        self.axis, self.value_um, self.limits_um = axis, value_um, limits_um
+        self.axis = axis
+        self.value_um = value_um
+        self.limits_um = limits_um

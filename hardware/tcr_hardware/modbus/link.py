@@ -170,7 +170,7 @@ class ModbusLink:
         return self._registers(answer, count)
 
     def _settle(self) -> None:
-        """After a failure on a serial line: make sure that no late answer is under way.
+        """Make sure that no late answer is under way, after a failure on a serial line.
 
         Serial frames carry no transaction number, so that a late answer passes for the next one. Answers keep their
         order: once a probe is answered, all that was asked before it is answered or lost. No other request of ours
@@ -190,14 +190,14 @@ class ModbusLink:
                 return
 
     def _registers(self, answer: ModbusPDU, count: int) -> list[int]:
-        """Registers of an answer, if it has as many as were asked for."""
+        """Return the registers of an answer if it has as many as were asked for."""
         if len(answer.registers) != count:
             self._unsure = True
             raise StaleAnswerError("number of registers", count, len(answer.registers))
         return list(answer.registers)
 
     def _ask(self, what: str, function: int, request: Callable[[], ModbusPDU]) -> ModbusPDU:
-        """One request and its answer, with every failure as an error of this package."""
+        """Send one request and return its answer, with every failure as an error of this package."""
         if not self.connected:
             raise LinkLostError(f"not connected to the PLC at {self._link}")
         began = time.monotonic()
@@ -227,7 +227,7 @@ class PromptSerialClient(ModbusSerialClient):
     """Serial client that wakes up when bytes come, where the one of pymodbus looks every millisecond or more."""
 
     def recv(self, size: int | None) -> bytes:
-        """Bytes that have come within the time-out; none if none came."""
+        """Read the bytes that come within the time-out; none if none came."""
         line, timeout_s = self.socket, self.comm_params.timeout_connect
         if line is None:
             raise ConnectionException(str(self))
@@ -239,7 +239,7 @@ class PromptSerialClient(ModbusSerialClient):
 
 
 def _client(link: TcpLink | RtuLink, timeout_s: float) -> ModbusTcpClient | ModbusSerialClient:
-    """Client of pymodbus that neither retries nor waits longer than one answer may take."""
+    """Make a client of pymodbus that neither retries nor waits longer than one answer may take."""
     if isinstance(link, TcpLink):
         return ModbusTcpClient(link.host, port=link.port, timeout=timeout_s, retries=0)
     return PromptSerialClient(
@@ -253,7 +253,7 @@ def _client(link: TcpLink | RtuLink, timeout_s: float) -> ModbusTcpClient | Modb
 
 
 def _why_no_device(device: str) -> str:
-    """What keeps a serial device from being opened."""
+    """Say what keeps a serial device from being opened."""
     if not os.path.exists(device):
         return "There is no such device."
     if not os.access(device, os.R_OK | os.W_OK):

@@ -66,7 +66,7 @@ class Reject(IntEnum):
     ESTOP = 5
 
 
-class Fault(IntEnum):
+class FaultCode(IntEnum):
     """Values of FAULT: why the PLC stopped by itself."""
 
     NONE = 0
@@ -132,11 +132,11 @@ class RegisterMap:
         return self._by_name[name]
 
     def block(self, name: str) -> tuple[Register, ...]:
-        """Registers of one block."""
+        """Return registers of one block."""
         return tuple(register for register in self.registers if register.block == name)
 
     def span(self, name: str) -> tuple[int, int]:
-        """First address of a block and number of registers from there to its end."""
+        """Return the first address of a block and number of registers from there to its end."""
         block = self.block(name)
         first = min(register.address for register in block)
         return first, max(register.end for register in block) - first
@@ -217,13 +217,15 @@ def _default_rows(axes: int) -> dict[str, Register]:
 
 
 def _wrong(name: str, change: Mapping[str, object]) -> list[str]:
-    """What is wrong with a change as such."""
+    """Say what is wrong with a change as such."""
     problems = [
         f"{name}.{key}: unknown; allowed: address, kind, scale"
         for key in change
         if key not in ("address", "kind", "scale")
     ]
-    address, kind, scale = change.get("address", 0), change.get("kind", "u16"), change.get("scale", 1.0)
+    address = change.get("address", 0)
+    kind = change.get("kind", "u16")
+    scale = change.get("scale", 1.0)
     if isinstance(address, bool) or not isinstance(address, int) or not 0 <= address <= 0xFFFF:
         problems.append(f"{name}.address: {address!r} is not a whole number from 0 to 65535")
     if kind not in WIDTHS:
@@ -234,7 +236,7 @@ def _wrong(name: str, change: Mapping[str, object]) -> list[str]:
 
 
 def _unusable(rows: tuple[Register, ...]) -> list[str]:
-    """What keeps a map from being usable."""
+    """Say what keeps a map from being usable."""
     ordered = sorted(rows, key=lambda row: row.address)
     problems = [
         f"{lower.name} ({lower.address} .. {lower.end - 1}) overlaps {upper.name} (from {upper.address})"
@@ -247,7 +249,8 @@ def _unusable(rows: tuple[Register, ...]) -> list[str]:
         problems.append(f"SEQ has to be the last register of the command block, not {command[-1].name}")
     for block in BLOCKS:
         members = [row for row in ordered if row.block == block]
-        span, most = members[-1].end - members[0].address, MOST_WRITTEN if block == "command" else MOST_READ
+        span = members[-1].end - members[0].address
+        most = MOST_WRITTEN if block == "command" else MOST_READ
         if block == "command" and span != sum(row.words for row in members):
             problems.append("the command block has a gap; it is written as one piece")
         if span > most:

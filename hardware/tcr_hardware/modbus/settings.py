@@ -22,7 +22,7 @@ class TcpLink:
     port: int = 502
 
     def __str__(self) -> str:
-        """For messages."""
+        """Return the name for messages."""
         return f"{self.host}:{self.port}"
 
 
@@ -43,7 +43,7 @@ class RtuLink:
     stop_bits: int = 1
 
     def __str__(self) -> str:
-        """For messages."""
+        """Return the name for messages."""
         return f"{self.device} at {self.baud} baud"
 
 

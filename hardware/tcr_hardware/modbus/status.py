@@ -17,7 +17,7 @@ class PlcStatus:
         seq_ack: SEQ that the PLC accepted last.
         ack_lag: How many blocks the acknowledge is behind; 1 is normal, a PLC answers before its next scan.
         status: Status bits.
-        fault: Value of FAULT, normally one of `Fault`.
+        fault: Value of FAULT, normally one of `FaultCode`.
         reject: Why the last set-points were refused.
         reject_axis: Axis that was the reason, from 1; 0 for none.
         heartbeat_echo: HEARTBEAT as seen by the PLC program.

@@ -28,13 +28,13 @@ def silence(link: RtuLink) -> float:
 
 
 def frame_time(link: RtuLink, size: int) -> float:
-    """Time that a frame of ``size`` bytes takes, with the silence before it [s]."""
+    """Return the time that a frame of ``size`` bytes takes, with the silence before it [s]."""
     bits = 1 + 8 + (link.parity != "N") + link.stop_bits
     return size * bits / link.baud + silence(link)
 
 
 def exchange_time(link: RtuLink, written: int, read: int, exchange: str) -> float:
-    """Time on the wire of one exchange: requests, answers, silences [s].
+    """Return the time on the wire of one exchange: requests, answers, silences [s].
 
     Args:
         link: The line.
@@ -49,7 +49,7 @@ def exchange_time(link: RtuLink, written: int, read: int, exchange: str) -> floa
 
 
 def share_of_period(settings: BusSettings, watchdog_ms: int, period_s: float) -> float:
-    """Share of a control period that one exchange takes on the wire; 0 for TCP.
+    """Return the share of a control period that one exchange takes on the wire; 0 for TCP.
 
     Args:
         settings: The bus.
@@ -86,7 +86,7 @@ def share_of_period(settings: BusSettings, watchdog_ms: int, period_s: float) ->
 
 
 def _check_watchdog(settings: BusSettings, watchdog_s: float, period_s: float) -> None:
-    """The watchdog has to outlast a few cycles, and a silent PLC has to be noticed before it trips."""
+    """Check that the watchdog outlasts a few cycles, and that a silent PLC is noticed before it trips."""
     if WATCHDOG_PERIODS * period_s > watchdog_s:
         raise RateError(
             f"period {1e3 * period_s:g} ms: the watchdog of the PLC ({1e3 * watchdog_s:g} ms) has to be "

@@ -30,7 +30,7 @@ class WordCodec:
     byte_order: str = "big"
 
     def encode(self, register: Register, values: Sequence[float]) -> list[int]:
-        """Registers (words,) that hold the values (count,), given in the unit of the register.
+        """Return registers (words,) that hold the values (count,), given in the unit of the register.
 
         Raises:
             SetpointError: A value is no finite number or does not fit.
@@ -43,7 +43,7 @@ class WordCodec:
         return words
 
     def decode(self, register: Register, words: Sequence[int]) -> tuple[float, ...]:
-        """Values (count,) in the unit of the register, from its registers (words,)."""
+        """Return the values (count,) in the unit of the register, from its registers (words,)."""
         width = register.words // register.count
         raw = [self._raw(register.kind, words[i : i + width]) for i in range(0, register.words, width)]
         return tuple(raw) if register.scale == 1.0 else tuple(value * register.scale for value in raw)
@@ -71,7 +71,7 @@ class WordCodec:
 
 
 def _raw(register: Register, value: object) -> float:
-    """Counts of a value."""
+    """Return the counts of a value."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise SetpointError(register.name, value, "finite numbers")
     counts = float(value) / register.scale
@@ -88,7 +88,7 @@ def _raw(register: Register, value: object) -> float:
 
 
 def probe(magic: int, pair: Sequence[int]) -> WordCodec:
-    """Word and byte order of a PLC, from its MAGIC register and the two registers of ORDER_PROBE.
+    """Find a PLC's word and byte order, from its MAGIC register and the two registers of ORDER_PROBE.
 
     Raises:
         PlcMismatchError: They hold the two constants in no order.

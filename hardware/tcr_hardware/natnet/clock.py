@@ -26,7 +26,7 @@ class Echo:
     at: float
 
     def uncertainty_at(self, now: float) -> float:
-        """Uncertainty after drifting until ``now`` [s]."""
+        """Return the uncertainty after drifting until ``now`` [s]."""
         return self.uncertainty + LARGEST_DRIFT * (now - self.at)
 
 
@@ -52,7 +52,9 @@ class ServerClock:
 
     def reset(self, hz: int) -> None:
         """Begin anew with a server whose clock has ``hz`` ticks per second (0: it has none)."""
-        self.hz, self.best, self.round_trip = hz, None, None
+        self.hz = hz
+        self.best = None
+        self.round_trip = None
 
     def add(self, sent: float, received: float, ticks: int) -> bool:
         """Take an echo: our times of request and answer [s], the server's time between them [ticks].
@@ -77,7 +79,7 @@ class ServerClock:
         return jumped
 
     def local(self, ticks: int) -> float | None:
-        """Server ticks on our clock [s]; None if the server did not say (0) or no echo has come back yet."""
+        """Return server ticks on our clock [s]; None if the server did not say (0) or no echo has come back yet."""
         if ticks == 0 or self.best is None:
             return None
         return ticks / self.hz + self.best.offset

@@ -20,7 +20,9 @@ class MalformedPacketError(NatNetError):
 
     def __init__(self, problem: str, offset: int, size: int) -> None:
         super().__init__(f"malformed NatNet packet: {problem} at byte {offset} of {size}")
-        self.problem, self.offset, self.size = problem, offset, size
+        self.problem = problem
+        self.offset = offset
+        self.size = size
 
 
 class UnsupportedVersionError(NatNetError):
@@ -47,7 +49,9 @@ class ServerSilentError(NatNetError):
 
     def __init__(self, address: str, awaited: str, waited_s: float, *, hint: str = "") -> None:
         super().__init__(f"no {awaited} from {address} within {waited_s:g} s", hint=hint)
-        self.address, self.awaited, self.waited_s = address, awaited, waited_s
+        self.address = address
+        self.awaited = awaited
+        self.waited_s = waited_s
 
 
 class RequestRefusedError(NatNetError):

@@ -104,7 +104,7 @@ class Suffix(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class MocapFrame:
     """One decoded frame. The arrays are read-only views of the packet.
 
     Attributes:
@@ -134,7 +134,7 @@ class Frame:
     suffix: Suffix
 
     def has(self, flag: int) -> bool:
-        """Whether the server set a flag of the frame, for instance ``MODELS_CHANGED``."""
+        """Tell whether the server set a flag of the frame, for instance ``MODELS_CHANGED``."""
         return bool(self.suffix.params & flag)
 
 

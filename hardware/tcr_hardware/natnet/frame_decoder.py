@@ -32,8 +32,8 @@ from tcr_hardware.natnet.frame import (
     Analog,
     Asset,
     BodyMarkers,
-    Frame,
     MarkerSet,
+    MocapFrame,
     Records,
     Skeleton,
     Suffix,
@@ -76,7 +76,7 @@ class Layout:
 
 @lru_cache(maxsize=32)
 def layout_of(version: Version) -> Layout:
-    """Layout of a version; for versions after ``NEWEST`` that of ``NEWEST`` with longer elements and sections."""
+    """Return a version's layout; after ``NEWEST`` that of ``NEWEST`` with longer elements and sections."""
     marker = MARKER if version >= (3, 0) else _MARKER_26 if version >= (2, 6) else _MARKER_25
     return Layout(
         sized=version >= (4, 1),
@@ -91,7 +91,7 @@ def layout_of(version: Version) -> Layout:
     )
 
 
-def decode_frame(payload: bytes, version: Version) -> Frame:
+def decode_frame(payload: bytes, version: Version) -> MocapFrame:
     """Decode the payload of FRAMEOFDATA.
 
     Raises:
@@ -111,10 +111,19 @@ def decode_frame(payload: bytes, version: Version) -> Frame:
         _, size = reader.integer(), reader.integer()  # a section that we do not know
         reader.skip(size)
     suffix = _suffix(reader, layout)
-    return Frame(
-        number, marker_sets, unlabelled, rigid_bodies, body_markers, skeletons, assets, markers, plates,
-        devices, suffix,
-    )  # fmt: skip
+    return MocapFrame(
+        number,
+        marker_sets,
+        unlabelled,
+        rigid_bodies,
+        body_markers,
+        skeletons,
+        assets,
+        markers,
+        plates,
+        devices,
+        suffix,
+    )
 
 
 def _section_end(reader: Reader, layout: Layout) -> int | None:
@@ -169,16 +178,18 @@ def _rigid_body_section(reader: Reader, layout: Layout) -> tuple[Records, tuple[
 
 
 def _rigid_bodies(reader: Reader, layout: Layout) -> Records:
-    """Bodies within a skeleton or asset."""
+    """Read the bodies within a skeleton or asset."""
     if layout.packed_bodies:
         return reader.array(RIGID_BODY, reader.count("rigid bodies", RIGID_BODY.itemsize))
     return _bodies_with_markers(reader, layout)[0]
 
 
 def _bodies_with_markers(reader: Reader, layout: Layout) -> tuple[Records, tuple[BodyMarkers, ...]]:
-    """Rigid bodies before 3.0: each carries its markers."""
+    """Read rigid bodies before 3.0: each carries its markers."""
     count = reader.items("rigid bodies", _BODY.size + 8)
-    packed, markers, start = bytearray(count * RIGID_BODY.itemsize), [], 0
+    packed = bytearray(count * RIGID_BODY.itemsize)
+    markers = []
+    start = 0
     for _ in range(count):
         head = reader.unpack(_BODY)
         n = reader.count("markers of a body", POINT.itemsize + 8)
@@ -206,7 +217,7 @@ def _analog(reader: Reader, layout: Layout) -> Analog:
 
 
 def _widened(markers: Records) -> Records:
-    """Labelled markers of any version as ``MARKER``; what the version lacks is 0."""
+    """Read labelled markers of any version as ``MARKER``; what the version lacks is 0."""
     if markers.dtype is MARKER:
         return markers
     wide = records(MARKER, len(markers))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from tcr_hardware.natnet.frame import Frame
+from tcr_hardware.natnet.frame import MocapFrame
 from tcr_hardware.natnet.models import ModelDefinitions
 
 
@@ -28,7 +28,7 @@ class MarkerFrame:
     arrival: float
     exposure: float | None
     software_latency: float | None
-    data: Frame
+    data: MocapFrame
     models: ModelDefinitions | None
 
     @property
@@ -44,5 +44,5 @@ class MarkerFrame:
         return self.arrival - (self.software_latency or 0.0)
 
     def age(self, now: float | None = None) -> float:
-        """Time since ``taken_at`` [s]."""
+        """Return the time since ``taken_at`` [s]."""
         return (time.monotonic() if now is None else now) - self.taken_at

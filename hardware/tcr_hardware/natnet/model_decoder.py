@@ -106,7 +106,9 @@ def _camera(reader: Reader, version: Version, found: _Found) -> None:
 
 
 def _asset(reader: Reader, version: Version, found: _Found) -> None:
-    name, _, asset_id = reader.text(), reader.integer(), reader.integer()
+    name = reader.text()
+    reader.integer()
+    asset_id = reader.integer()
     for _ in range(reader.items("bones", 21)):
         _body(reader, version)
     markers = []
@@ -119,7 +121,7 @@ def _asset(reader: Reader, version: Version, found: _Found) -> None:
 
 
 def _identity(asset: int, member: int) -> int:
-    """Number of a marker in a frame: asset in the upper half, member (from 1) in the lower."""
+    """Return a marker's number in a frame: asset in the upper half, member (from 1) in the lower."""
     return (asset << 16) | (member & 0xFFFF)
 
 

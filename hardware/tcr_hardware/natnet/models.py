@@ -37,7 +37,7 @@ class ModelDefinitions:
     skipped: tuple[int, ...] = ()
 
     def labels(self) -> dict[str, int]:
-        """Numbers of all markers by label ``asset.marker``.
+        """Return the numbers of all markers by label ``asset.marker``.
 
         Names come from the asset itself or, before 4.0, from the marker set of the same name: a server lists
         one for every asset. Markers without a name are called by their place: ``asset.1``.

@@ -93,7 +93,7 @@ class FrameOrder:
             self._missing = {each for each in self._missing if each > oldest}
 
     def _strange_number(self, number: int, now: float, models_changed: bool) -> Arrival:
-        """A repeated packet, a corrupt number, or a new session: the circumstances or the next numbers decide."""
+        """Tell a repeated packet, a corrupt number and a new session apart, by circumstances or later numbers."""
         assert self.last is not None
         if self._strange and not 0 < number - self._strange[-1] <= REORDER_WINDOW:
             self._strange.clear()

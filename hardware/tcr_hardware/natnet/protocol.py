@@ -114,7 +114,10 @@ class ServerInfo:
         # The rest of the buffer behind the name is whatever lay in the server's memory.
         application = name.partition(b"\0")[0].decode("utf-8", "replace")
         version = Version(natnet[0], natnet[1])
-        clock_hz, data_port, multicast, group = 0, DATA_PORT, None, MULTICAST_GROUP
+        clock_hz = 0
+        data_port = DATA_PORT
+        multicast = None
+        group = MULTICAST_GROUP
         if version >= (3, 0):
             if len(payload) < SENDER.size + SENDER_CLOCK.size:
                 raise MalformedPacketError("server info without clock", len(payload), len(payload))

@@ -28,7 +28,9 @@ class Reader:
     __slots__ = ("_items", "buffer", "end", "offset")
 
     def __init__(self, buffer: bytes, most_items: int = MOST_ITEMS) -> None:
-        self.buffer, self.offset, self.end = buffer, 0, len(buffer)
+        self.buffer = buffer
+        self.offset = 0
+        self.end = len(buffer)
         self._items = most_items
 
     @property

@@ -27,7 +27,10 @@ class Receiver:
     """
 
     def __init__(self, sockets: Sockets, session: Session, inbox: Inbox, server: tuple[str, int]) -> None:
-        self._sockets, self._session, self._inbox, self._server = sockets, session, inbox, server
+        self._sockets = sockets
+        self._session = session
+        self._inbox = inbox
+        self._server = server
         self.foreign = 0
         session.last_problem = sockets.note
         self._stopping = threading.Event()
@@ -47,7 +50,7 @@ class Receiver:
             self._unreachable(error)
 
     def _run(self) -> None:
-        """Whatever ends the thread is told to the readers: a silent end would look like still markers."""
+        """Tell readers whatever ends the thread: a silent end would look like still markers."""
         try:
             with selectors.DefaultSelector() as selector:
                 self._loop(selector)

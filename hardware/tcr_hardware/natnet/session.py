@@ -15,7 +15,7 @@ from collections.abc import Callable
 from tcr_hardware.natnet import protocol
 from tcr_hardware.natnet.clock import ServerClock
 from tcr_hardware.natnet.errors import MalformedPacketError, NatNetError
-from tcr_hardware.natnet.frame import BITSTREAM_CHANGED, MODELS_CHANGED, Frame
+from tcr_hardware.natnet.frame import BITSTREAM_CHANGED, MODELS_CHANGED, MocapFrame
 from tcr_hardware.natnet.frame_decoder import decode_frame
 from tcr_hardware.natnet.marker_frame import MarkerFrame
 from tcr_hardware.natnet.model_decoder import decode_models
@@ -66,9 +66,14 @@ class Session:
         self._models_changing = self._refresh_models = False
         self._echoes: deque[int] = deque(maxlen=ECHOES)
         self._timers = Timers(
-            now, connect=RETRY_S, bitstream=RETRY_S, models=RETRY_S, keep_alive=settings.keep_alive_s,
-            echo=settings.echo_s, silence=settings.silence_s,
-        )  # fmt: skip
+            now,
+            connect=RETRY_S,
+            bitstream=RETRY_S,
+            models=RETRY_S,
+            keep_alive=settings.keep_alive_s,
+            echo=settings.echo_s,
+            silence=settings.silence_s,
+        )
 
     @property
     def version(self) -> Version | None:
@@ -97,7 +102,7 @@ class Session:
         return frame
 
     def due(self, now: float) -> list[bytes]:
-        """Datagrams to be sent to the server at ``now`` [s]."""
+        """Return the datagrams to be sent to the server at ``now`` [s]."""
         wanted: list[bytes] = []
         if self._timers.due("connect" if self.server is None else "silence", now) and self._lacks_frames(now):
             wanted.append(protocol.connect(self.choice.asked))
@@ -117,7 +122,7 @@ class Session:
         return wanted
 
     def next_due(self, now: float) -> float:
-        """Seconds until ``due`` may have something to send."""
+        """Return the seconds until ``due`` may have something to send."""
         return self._timers.until_next(now)
 
     def _lacks_frames(self, now: float) -> bool:
@@ -142,7 +147,7 @@ class Session:
         return None
 
     def _server_info(self, info: ServerInfo) -> None:
-        """The server introduced itself: for the first time, again, or as another one."""
+        """Note that the server introduced itself: for the first time, again, or as another one."""
         same, self.server = info == self.server, info
         if same and (self.choice.pending or self.choice.stream is not None):
             return
@@ -172,7 +177,7 @@ class Session:
         return self._on_our_clock(data, now)
 
     def _notice_models(self, new_session: bool, flagged: bool) -> None:
-        """The flag may stay for many frames: its beginning counts, and its end, for what changed in between."""
+        """Note a flag that may stay for many frames: its beginning counts, and its end, for changes in between."""
         if new_session or (flagged and not self._models_changing):
             self._forget_models()
         elif self._models_changing and not flagged:
@@ -181,12 +186,12 @@ class Session:
         self._models_changing = flagged
 
     def _forget_models(self) -> None:
-        """Names may have changed: none is better than a wrong one."""
+        """Forget names that may have changed: none is better than a wrong one."""
         if self.models is not None:
             self.models = None
             self._timers.now_due("models")
 
-    def _on_our_clock(self, data: Frame, now: float) -> MarkerFrame:
+    def _on_our_clock(self, data: MocapFrame, now: float) -> MarkerFrame:
         latency, suffix = data.suffix.software_latency, data.suffix
         if latency is None and suffix.received and suffix.transmit and self.clock.hz:
             latency = (suffix.transmit - suffix.received) / self.clock.hz

@@ -15,7 +15,7 @@ RECEIVE_BUFFER = 1 << 20
 
 
 def resolve(host: str) -> str:
-    """Address of a host.
+    """Look up the address of a host.
 
     Raises:
         SocketError: There is no such host.
@@ -27,7 +27,7 @@ def resolve(host: str) -> str:
 
 
 def refuses(address: tuple[str, int]) -> bool:
-    """Whether the computer at ``address`` says that nobody listens at that port; False if it says nothing."""
+    """Tell whether the computer at ``address`` says that nobody listens at that port; False if it says nothing."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.settimeout(0.1)
         try:
@@ -142,7 +142,7 @@ class Sockets:
         return self.listen(self.settings.group or server.group, self.settings.data_port or server.data_port)
 
     def all(self) -> list[socket.socket]:
-        """Every open socket."""
+        """Return every open socket."""
         return [self.command, *self.data.values()]
 
     def close(self) -> None:

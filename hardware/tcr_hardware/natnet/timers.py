@@ -11,7 +11,7 @@ class Timers:
         self._next = dict.fromkeys(periods, now)
 
     def due(self, name: str, now: float) -> bool:
-        """Whether the deadline has passed; if so, the next one is a period after ``now`` [s]."""
+        """Tell whether the deadline has passed; if so, the next one is a period after ``now`` [s]."""
         if now < self._next[name]:
             return False
         self._next[name] = now + self._periods[name]
@@ -23,6 +23,6 @@ class Timers:
             self._next[name] = float("-inf")
 
     def until_next(self, now: float) -> float:
-        """Seconds from ``now`` to the next deadline; one that nobody asks for at present counts by its period."""
+        """Return the seconds from ``now`` to the next deadline; one that nobody asks for counts by its period."""
         waits = (at - now if at > now else self._periods[name] for name, at in self._next.items())
         return min(waits)

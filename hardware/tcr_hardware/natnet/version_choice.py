@@ -52,12 +52,12 @@ class VersionChoice:
             self._settle(version)
 
     def ask_again(self) -> None:
-        """The server announced another version: find out which."""
+        """Find out which version the server has changed to."""
         if not self._settings.multicast and self._own >= (4, 0):
             self._open()
 
     def questions(self) -> list[str]:
-        """Requests to send now; gives up after ``TRIES`` and takes the version for agreed."""
+        """Return the requests to send now; after ``TRIES`` give up and take the version for agreed."""
         self._tries += 1
         if self._tries > TRIES:
             self.pending = False
@@ -90,7 +90,9 @@ class VersionChoice:
         return False
 
     def _open(self) -> None:
-        self.pending, self._tries, self._set_requests = True, 0, 0
+        self.pending = True
+        self._tries = 0
+        self._set_requests = 0
 
     def _told(self, text: str) -> None:
         try:

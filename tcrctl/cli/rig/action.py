@@ -11,7 +11,7 @@ from tcrctl.cli.rig.rows import cable_names, flat, print_rows
 
 if TYPE_CHECKING:
     from tcrctl.plant.rig.file import LoadedRig
-    from tcrctl.plant.rig.session import Session
+    from tcrctl.plant.rig.operation import Operation
 
 
 def act(
@@ -21,7 +21,7 @@ def act(
     yes: bool,
     as_json: bool,
     question: Callable[[LoadedRig], str],
-    action: Callable[[LoadedRig, tuple[str, ...], Session], dict[str, Any]],
+    action: Callable[[LoadedRig, tuple[str, ...], Operation], dict[str, Any]],
 ) -> None:
     """Ask, do, show.
 
@@ -32,16 +32,16 @@ def act(
         yes: Somebody has agreed already.
         as_json: Show the result as one object.
         question: What is going to happen, a sentence.
-        action: Does it; takes the rig, the names of the cables and the session.
+        action: Does it; takes the rig, the names of the cables and the operation.
     """
     from tcrctl.cli.consent import ask
     from tcrctl.commissioning.choice import choose
-    from tcrctl.plant.rig.session import Session
+    from tcrctl.plant.rig.operation import Operation
 
     loaded, description = choose(rig, robot)
     if not (dry_run or yes):
         ask(question(loaded))
-    result = action(loaded, cable_names(description), Session(report=_report, confirmed=True))
+    result = action(loaded, cable_names(description), Operation(report=_report, confirmed=True))
     head = {"status": "ok", "robot": loaded.robot, "dry_run": dry_run}
     if as_json:
         print(json.dumps({**head, **result}))

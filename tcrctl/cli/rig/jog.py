@@ -13,7 +13,7 @@ from tcrctl.cli.rig.options import DryRun, Rig, Robot, Yes
 
 if TYPE_CHECKING:
     from tcrctl.plant.rig.file import LoadedRig
-    from tcrctl.plant.rig.session import Session
+    from tcrctl.plant.rig.operation import Operation
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,13 @@ def jog(
     from tcrctl.errors import InputError
     from tcrctl.loop.interruption import Interruption
 
-    cable, by_mm, to_mm = wanted.cable, wanted.by_mm, wanted.to_mm
+    cable = wanted.cable
+    by_mm = wanted.by_mm
+    to_mm = wanted.to_mm
     if (by_mm is None) == (to_mm is None):
         raise InputError("give either --by-mm or --to-mm")
 
-    def move(loaded: LoadedRig, names: tuple[str, ...], session: Session) -> dict[str, Any]:
+    def move(loaded: LoadedRig, names: tuple[str, ...], operation: Operation) -> dict[str, Any]:
         motion = Jog(
             names if cable == ["all"] else tuple(cable),
             None if by_mm is None else 1e-3 * by_mm,
@@ -60,11 +62,15 @@ def jog(
             1e-3 * wanted.speed_mm_s,
         )
         with Interruption() as interruption:
-            return jog_rig(loaded, names, motion, session, dry_run=dry_run, check=interruption.check)
+            return jog_rig(loaded, names, motion, operation, dry_run=dry_run, check=interruption.check)
 
     where = f"by {by_mm:g} mm" if by_mm is not None else f"to {to_mm:g} mm"
     act(
-        rig, robot, dry_run, yes, as_json,
+        rig,
+        robot,
+        dry_run,
+        yes,
+        as_json,
         lambda loaded: f"Cables {', '.join(cable)} of {loaded.robot} move {where}.",
         move,
-    )  # fmt: skip
+    )

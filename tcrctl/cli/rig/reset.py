@@ -19,7 +19,11 @@ def reset(
     from tcrctl.commissioning.zero import reset_rig
 
     act(
-        rig, robot, dry_run, yes, as_json,
+        rig,
+        robot,
+        dry_run,
+        yes,
+        as_json,
         lambda loaded: f"The latched fault of the drives of {loaded.robot} is cleared.",
-        lambda loaded, names, session: reset_rig(loaded, names, session, dry_run=dry_run),
-    )  # fmt: skip
+        lambda loaded, names, operation: reset_rig(loaded, names, operation, dry_run=dry_run),
+    )

@@ -10,14 +10,14 @@ if TYPE_CHECKING:
 
 
 def cable_names(description: RobotDescription) -> tuple[str, ...]:
-    """Names of the cables in the order of the drives."""
+    """Return the names of the cables in the order of the drives."""
     from tcrctl.robot.description import cable_routes
 
     return tuple(route.name for route in cable_routes(description))
 
 
 def flat(value: dict[str, Any], prefix: str = "") -> dict[str, str]:
-    """A result as one text per number, by its path; what is not known is left out."""
+    """Write a result as one text per number, by its path; what is not known is left out."""
     rows: dict[str, str] = {}
     for key, item in value.items():
         if isinstance(item, dict):

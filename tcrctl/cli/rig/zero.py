@@ -21,7 +21,11 @@ def zero(
     from tcrctl.commissioning.zero import zero_rig
 
     act(
-        rig, robot, dry_run, yes, as_json,
+        rig,
+        robot,
+        dry_run,
+        yes,
+        as_json,
         lambda loaded: f"The present positions of the drives of {loaded.robot} become zero.",
-        lambda loaded, names, session: zero_rig(loaded, names, session, dry_run=dry_run),
-    )  # fmt: skip
+        lambda loaded, names, operation: zero_rig(loaded, names, operation, dry_run=dry_run),
+    )

@@ -40,7 +40,7 @@ class Cameras(Protocol):
     rate: float
 
     def next(self, timeout: float, *, fresh: bool) -> Sighting | None:
-        """The newest frame not returned before; None if none comes within ``timeout`` [s].
+        """Return the newest frame not returned before; None if none comes within ``timeout`` [s].
 
         Args:
             timeout: How long a frame is waited for [s].

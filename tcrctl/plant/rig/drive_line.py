@@ -33,11 +33,11 @@ class DriveLine:
         self.status: DriveStatus | None = None
 
     def ask(self) -> bool:
-        """Whether the drives answered the question how they are."""
+        """Tell whether the drives answered the question how they are."""
         return self._call(self._questions, self._drives.status)
 
     def exchange(self, target: Micrometres, control: DriveControl) -> bool:
-        """Whether the drives answered a command; a PLC answers before it looks at the set-points."""
+        """Tell whether the drives answered a command; a PLC answers before it looks at the set-points."""
         return self._call(self._commands, lambda: self._drives.exchange(target, control))
 
     def _call(self, calls: _Calls, call: Callable[[], DriveStatus]) -> bool:
@@ -60,13 +60,13 @@ class DriveLine:
         return self._commands.hopeless or self._questions.hopeless
 
     def silence(self) -> float:
-        """How long calls of a kind that fails now have not succeeded [s]; 0 if none fails."""
+        """Return how long calls of a kind that fails now have not succeeded [s]; 0 if none fails."""
         now = self._clock()
         failing = [calls for calls in (self._questions, self._commands) if calls.trouble]
         return max((now - calls.answered for calls in failing), default=0.0)
 
     def position(self) -> Micrometres:
-        """Where the drives were when they answered last (m,) [um].
+        """Return where the drives were when they answered last (m,) [um].
 
         Raises:
             DeviceError: If they never did.

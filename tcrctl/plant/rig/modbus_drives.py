@@ -18,7 +18,7 @@ from tcr_hardware.modbus.errors import (
     PlcMismatchError,
     RateError,
 )
-from tcr_hardware.modbus.registers import Control, Fault, Reject, Status, register_map
+from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status, register_map
 from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
 from tcrctl.config.settings import Settings
 from tcrctl.errors import DeviceError, InputError, UntrustworthyDeviceError
@@ -188,7 +188,7 @@ class ModbusDrives:
 
 
 def _axis_range(cable: CableDrive) -> tuple[int, int]:
-    """Soft limits as the axis counts them [um]."""
+    """Return the soft limits as the axis counts them [um]."""
     ends = (round(1e3 * cable.sign * cable.min_mm), round(1e3 * cable.sign * cable.max_mm))
     return min(ends), max(ends)
 
@@ -208,6 +208,6 @@ def _bits(control: DriveControl) -> Control:
 
 def _fault(code: int) -> str:
     try:
-        return Fault(code).name.lower().replace("_", " ")
+        return FaultCode(code).name.lower().replace("_", " ")
     except ValueError:
         return f"code {code}"

@@ -106,7 +106,9 @@ class NatNetCameras:
             InputError: If a label is not known there.
         """
         self.client = connect(cameras)
-        self._settings, self._last, self._bits = cameras, None, b""
+        self._settings = cameras
+        self._last = None
+        self._bits = b""
         try:
             with device_errors(f"cameras at {cameras.server}"):
                 self.rate = cameras.rate_hz or self.client.frame_rate()
@@ -121,7 +123,7 @@ class NatNetCameras:
     _last: MarkerFrame | None
 
     def next(self, timeout: float, *, fresh: bool) -> Sighting | None:
-        """The newest frame not returned before; one that repeats the last bit for bit is none.
+        """Return the newest frame not returned before; one that repeats the last bit for bit is none.
 
         Cameras have noise: a frame that equals the one before was not taken anew.
         """
@@ -134,7 +136,7 @@ class NatNetCameras:
         return None if frame is None else self._mapped(frame)
 
     def _unseen(self) -> MarkerFrame | None:
-        """The newest frame, if it was not looked at before."""
+        """Return the newest frame if it was not looked at before."""
         newest, last = self.client.newest(), self._last
         return None if newest is None or (last and newest.sequence <= last.sequence) else newest
 
@@ -183,7 +185,7 @@ class NatNetCameras:
 def _marker_map(
     cameras: CameraSettings, markers: MarkerSettings, calibration: Calibration, robot: Robot
 ) -> tuple[MarkerMap, NDArray[np.int64]]:
-    """The map, and for each of its markers the row in ``Measurement.nodes``."""
+    """Return the map, and for each of its markers the row in ``Measurement.nodes``."""
     wanted = node_markers(markers, robot.n_modules)
     row_of = {row: i for i, row in enumerate(ring_rows(robot.n_modules))}
     nodes = [node_index(marker.node) for marker in wanted]

@@ -7,7 +7,7 @@
 
 Times are those of the run: a measurement carries the middle of its exposure. When the supervisor wants the run to
 end, ``read`` or ``write`` raises its reason; ``close`` then brings the drives to rest whatever has happened.
-"""  # fmt: skip
+"""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from tcrctl.errors import ArmingRefusedError, DeviceError
 from tcrctl.plant.rig.devices import Cameras, DriveControl, Drives, Sighting
 from tcrctl.plant.rig.doubt_notes import DoubtNotes
 from tcrctl.plant.rig.drive_line import DriveLine
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.health import Health, Rules
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.set_points import ClampNotes, DriveEnvelope, Micrometres, SetPoints
-from tcrctl.plant.rig.sight import Rules, Sight
-from tcrctl.plant.rig.supervisor import State, Supervisor
+from tcrctl.plant.rig.supervisor import SafetyState, Supervisor
 from tcrctl.signals import Array, Command, Measurement, Truth
 
 #: How often the drives are written to while they are armed or stopped outside the control loop [s].
@@ -68,7 +68,7 @@ class RigPlant:
         drives: Drives,
         limits: RigLimits,
         period: float,
-        session: Session,
+        operation: Operation,
         *,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
@@ -80,23 +80,23 @@ class RigPlant:
             drives: The cable drives.
             limits: What must be kept.
             period: Control period [s].
-            session: The run.
+            operation: The run.
             clock: Never jumps; that of the camera frames [s].
             sleep: Waits for a time [s].
         """
         self._cameras, self._line, self._limits = cameras, DriveLine(drives, clock), limits
-        self._period, self._session, self._clock, self._sleep = period, session, clock, sleep
-        self.supervisor = Supervisor(limits.rules, session.report)
+        self._period, self._operation, self._clock, self._sleep = period, operation, clock, sleep
+        self.supervisor = Supervisor(limits.rules, operation.report)
         self._points: SetPoints | None = None
         self._refused = 0
         self._seen: Sighting | None = None
         self._usable_at = -np.inf
-        self._clamps, self._doubts = ClampNotes(session.report), DoubtNotes(session.report, clock)
+        self._clamps, self._doubts = ClampNotes(operation.report), DoubtNotes(operation.report, clock)
 
     # --- the loop ---
 
     def read(self) -> Measurement:
-        """The next camera frame, and where the drives are.
+        """Return the next camera frame, and where the drives are.
 
         If no frame comes in time, it is the last one again, with the time at which it was taken.
 
@@ -124,7 +124,7 @@ class RigPlant:
             raise ArmingRefusedError(["the rig was never started"])
         self.supervisor.run()
         before = points.accepted
-        if self.supervisor.state is State.RUNNING:
+        if self.supervisor.state is SafetyState.RUNNING:
             target, clamps = points.propose(command.speed)
         else:
             points.start_again()
@@ -139,7 +139,7 @@ class RigPlant:
         return Command(np.asarray(change, float), np.asarray(1e-6 * points.accepted, float))
 
     def truth(self) -> Truth | None:
-        """A rig does not know more than it measures."""
+        """Return None: a rig does not know more than it measures."""
         return None
 
     # --- before and after it ---
@@ -151,8 +151,8 @@ class RigPlant:
             ArmingRefusedError: If a condition is not met; nothing has moved.
             DeviceError: If the drives are lost.
         """
-        self.supervisor.check_ready(self.look(), confirmed=self._session.confirmed)
-        self.arm(f"operator agreed; measurement {1e3 * self._sight().age:.0f} ms old")
+        self.supervisor.check_ready(self.look(), confirmed=self._operation.confirmed)
+        self.arm(f"operator agreed; measurement {1e3 * self._health().age:.0f} ms old")
 
     def arm(self, cause: str) -> None:
         """Switch the drives on and wait until they are; see :meth:`start`, which also looks at the cameras."""
@@ -164,11 +164,11 @@ class RigPlant:
                     hint = "Bring it inside with the PLC's own manual mode."
                     raise ArmingRefusedError(outside, hint=hint)
                 self._line.exchange(position, on)
-                sight = self._sight()
-                if sight.silence > self._limits.rules.silence:
-                    raise DeviceError(f"the drives do not answer: {sight.trouble}")
-                status = sight.status
-                if status is not None and status.enabled and status.acknowledged and not sight.trouble:
+                health = self._health()
+                if health.silence > self._limits.rules.silence:
+                    raise DeviceError(f"the drives do not answer: {health.trouble}")
+                status = health.status
+                if status is not None and status.enabled and status.acknowledged and not health.trouble:
                     break
                 if self._clock() - begun > self._limits.arm_timeout:
                     why = (status.fault if status else "") or "they do not say why"
@@ -200,14 +200,14 @@ class RigPlant:
             raise self.supervisor.failure
 
     def position(self) -> Micrometres:
-        """Where the drives were when they answered last (m,) [um].
+        """Return where the drives were when they answered last (m,) [um].
 
         Raises:
             DeviceError: If they never did.
         """
         return self._line.position()
 
-    def look(self) -> Sight:
+    def look(self) -> Health:
         """Ask cameras and drives and return what is known, without any consequence.
 
         A frame that has waited here for too long is no sign of bad cameras, so others get their chance.
@@ -216,8 +216,8 @@ class RigPlant:
         end = self._clock() + FIRST_LOOK * self._limits.rules.stale_stop
         while True:
             self._measurement(self._frame())
-            if self._sight().age < self._limits.rules.stale or self._clock() >= end:
-                return self._sight()
+            if self._health().age < self._limits.rules.stale or self._clock() >= end:
+                return self._health()
 
     def _come_to_rest(self) -> None:
         """Let the PLC ramp down, and see the drives stand still from one cycle to the next.
@@ -226,13 +226,13 @@ class RigPlant:
         """
         self.supervisor.stop(self._clock(), "end of the run")
         before: Micrometres | None = None
-        while self.supervisor.state is State.STOPPING:
+        while self.supervisor.state is SafetyState.STOPPING:
             self._line.exchange(self.position(), self.supervisor.control)
             answered, now = self._line.ask(), self.position()
             moved = before is None or bool(np.any(np.abs(now - before) > STILL))
             before = now
-            sight = replace(self._sight(), silence=0.0) if answered else self._sight()
-            if self.supervisor.rest(self._clock(), sight, moved=moved) is State.STOPPING:
+            health = replace(self._health(), silence=0.0) if answered else self._health()
+            if self.supervisor.rest(self._clock(), health, moved=moved) is SafetyState.STOPPING:
                 self._sleep(CYCLE)
 
     # --- devices ---
@@ -248,12 +248,12 @@ class RigPlant:
         self._refused = self._refused + 1 if refused else 0
 
     def _frame(self) -> Sighting | None:
-        """The next frame if the cameras are much faster than the loop, else the newest."""
+        """Return the next frame if the cameras are much faster than the loop, else the newest."""
         interval = 1.0 / self._cameras.rate
         return self._cameras.next(PATIENCE * interval, fresh=interval <= 0.5 * self._period)
 
     def _measurement(self, sighting: Sighting | None) -> Measurement:
-        now, run_time = self._clock(), self._session.time()
+        now, run_time = self._clock(), self._operation.time()
         status = self._line.status
         drive = np.zeros(0) if status is None else np.asarray(1e-6 * status.position, float)
         if sighting is None:
@@ -266,7 +266,7 @@ class RigPlant:
         return Measurement(taken, sighting.nodes, sighting.valid, drive, sighting.raw)
 
     def _last_seen(self, epoch: float, drive: Array) -> Measurement:
-        """What is known if no frame came; ``epoch`` is the time of the run at time 0 of the clock."""
+        """Return what is known if no frame came; ``epoch`` is the time of the run at time 0 of the clock."""
         seen = self._seen
         if seen is None:
             nobody = np.zeros(self._limits.nodes, np.bool_)
@@ -275,13 +275,13 @@ class RigPlant:
 
     # --- supervision ---
 
-    def _sight(self) -> Sight:
+    def _health(self) -> Health:
         now, following, laggard = self._clock(), 0, ""
         if self._points is not None and self._line.status is not None:
             error = np.abs(self._line.status.position - self._points.accepted)
             worst = int(np.argmax(error))
             following, laggard = int(error[worst]), self._limits.envelope.names[worst]
-        return Sight(
+        return Health(
             age=now - self._usable_at,
             status=self._line.status,
             silence=self._line.silence(),
@@ -293,6 +293,6 @@ class RigPlant:
         )
 
     def _supervise(self) -> None:
-        self.supervisor.watch(self._clock(), self._sight())
+        self.supervisor.watch(self._clock(), self._health())
         if self.supervisor.failure is not None:
             raise self.supervisor.failure

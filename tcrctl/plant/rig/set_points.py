@@ -43,7 +43,7 @@ class DriveEnvelope:
         names: Names of the cables.
         low: Shortest drive lengths [um].
         high: Longest drive lengths [um].
-        step: Most that a set-point may change from one write to the next [um].
+        change: Most that a set-point may change from one write to the next [um].
         speed: Largest speeds [um/s].
         acceleration: Largest change of speed [um/s2]; infinite if it is not limited.
         groups: Cables whose sum is limited.
@@ -52,7 +52,7 @@ class DriveEnvelope:
     names: tuple[str, ...]
     low: Micrometres
     high: Micrometres
-    step: Micrometres
+    change: Micrometres
     speed: Array
     acceleration: Array
     groups: tuple[AntagonistGroup, ...] = ()
@@ -110,10 +110,12 @@ class SetPoints:
         self.accepted: Micrometres = np.array(start, dtype=np.int64)
         self._before, self._exact = self.accepted, self.accepted.astype(float)
         self._speed = np.zeros(self.accepted.shape[0])
-        self._next, self._next_exact, self._next_speed = self.accepted, self._exact, self._speed
+        self._next = self.accepted
+        self._next_exact = self._exact
+        self._next_speed = self._speed
 
     def propose(self, speed: Array) -> tuple[Micrometres, tuple[Clamp, ...]]:
-        """Set-points for the coming period, and what had to be changed to stay inside the limits.
+        """Return set-points for the coming period, and what had to be changed to stay inside the limits.
 
         Args:
             speed: Wanted speeds (m,) [m/s].
@@ -130,16 +132,18 @@ class SetPoints:
         return whole, tuple(clamps)
 
     def accept(self) -> None:
-        """The drives have got what was proposed last."""
+        """Note that the drives have got what was proposed last."""
         self._before = self.accepted
-        self.accepted, self._exact, self._speed = self._next, self._next_exact, self._next_speed
+        self.accepted = self._next
+        self._exact = self._next_exact
+        self._speed = self._next_speed
 
     def start_again(self) -> None:
-        """The drives have not got it: the next proposal starts at what they got before, from standstill."""
+        """Note that they have not got it: the next proposal starts at what they got before, from standstill."""
         self._exact, self._speed = self.accepted.astype(float), np.zeros_like(self._speed)
 
     def take_back(self) -> None:
-        """The drives have refused what they got last: the one before is still in force."""
+        """Note that they have refused what they got last: the one before is still in force."""
         self.accepted = self._before
         self.start_again()
 
@@ -155,7 +159,7 @@ class SetPoints:
 
     def _allowed_positions(self, wanted: Micrometres, clamps: list[Clamp]) -> Micrometres:
         e = self._envelope
-        near = np.clip(wanted, self.accepted - e.step, self.accepted + e.step)
+        near = np.clip(wanted, self.accepted - e.change, self.accepted + e.change)
         self._note(clamps, "step limit", wanted, near, 1e3, "mm")
         # a start outside the stroke may only move inwards, and not faster than the step limit
         inside = np.clip(near, np.minimum(e.low, self.accepted), np.maximum(e.high, self.accepted))
@@ -176,9 +180,14 @@ class SetPoints:
         target[cables] = self.accepted[cables]
 
     def _note(
-        self, clamps: list[Clamp], rule: str, wanted: Array | Micrometres, sent: Array | Micrometres,
-        scale: float, unit: str,
-    ) -> None:  # fmt: skip
+        self,
+        clamps: list[Clamp],
+        rule: str,
+        wanted: Array | Micrometres,
+        sent: Array | Micrometres,
+        scale: float,
+        unit: str,
+    ) -> None:
         if not np.array_equal(wanted, sent):
             for c in np.flatnonzero(wanted != sent):
                 name = self._envelope.names[c]

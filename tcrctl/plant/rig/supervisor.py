@@ -36,7 +36,7 @@ from typing import Final
 
 from tcrctl.errors import ArmingRefusedError, DeviceError, RigStopError, TcrctlError
 from tcrctl.plant.rig.devices import DriveControl, DriveStatus
-from tcrctl.plant.rig.sight import Rules, Sight
+from tcrctl.plant.rig.health import Health, Rules
 
 Report = Callable[[str, str, str], None]
 """Takes kind, level and text of an event."""
@@ -44,7 +44,7 @@ Report = Callable[[str, str, str], None]
 RESET_HINT: Final = "When the cause is removed: tcrctl rig reset"
 
 
-class State(StrEnum):
+class SafetyState(StrEnum):
     """States of the supervisor, see the module's docstring."""
 
     DISARMED = "disarmed"
@@ -57,24 +57,24 @@ class State(StrEnum):
 
 
 _NEXT: Final = {
-    State.DISARMED: {State.ZEROING, State.ARMED, State.FAULTED},
-    State.ZEROING: {State.DISARMED, State.FAULTED},
-    State.ARMED: {State.RUNNING, State.STOPPING, State.FAULTED},
-    State.RUNNING: {State.HOLDING, State.STOPPING, State.FAULTED},
-    State.HOLDING: {State.RUNNING, State.STOPPING, State.FAULTED},
-    State.STOPPING: {State.DISARMED, State.FAULTED},
-    State.FAULTED: {State.DISARMED},
+    SafetyState.DISARMED: {SafetyState.ZEROING, SafetyState.ARMED, SafetyState.FAULTED},
+    SafetyState.ZEROING: {SafetyState.DISARMED, SafetyState.FAULTED},
+    SafetyState.ARMED: {SafetyState.RUNNING, SafetyState.STOPPING, SafetyState.FAULTED},
+    SafetyState.RUNNING: {SafetyState.HOLDING, SafetyState.STOPPING, SafetyState.FAULTED},
+    SafetyState.HOLDING: {SafetyState.RUNNING, SafetyState.STOPPING, SafetyState.FAULTED},
+    SafetyState.STOPPING: {SafetyState.DISARMED, SafetyState.FAULTED},
+    SafetyState.FAULTED: {SafetyState.DISARMED},
 }
 _CONTROL: Final = {
-    State.DISARMED: DriveControl(),
-    State.ZEROING: DriveControl(permit=True),
-    State.ARMED: DriveControl(enable=True, permit=True),
-    State.RUNNING: DriveControl(enable=True, follow=True, permit=True),
-    State.HOLDING: DriveControl(enable=True, follow=True, permit=True),
-    State.STOPPING: DriveControl(enable=True),
-    State.FAULTED: DriveControl(),
+    SafetyState.DISARMED: DriveControl(),
+    SafetyState.ZEROING: DriveControl(permit=True),
+    SafetyState.ARMED: DriveControl(enable=True, permit=True),
+    SafetyState.RUNNING: DriveControl(enable=True, follow=True, permit=True),
+    SafetyState.HOLDING: DriveControl(enable=True, follow=True, permit=True),
+    SafetyState.STOPPING: DriveControl(enable=True),
+    SafetyState.FAULTED: DriveControl(),
 }
-_MOVING: Final = (State.ARMED, State.RUNNING, State.HOLDING)
+_MOVING: Final = (SafetyState.ARMED, SafetyState.RUNNING, SafetyState.HOLDING)
 
 
 class Supervisor:
@@ -87,7 +87,7 @@ class Supervisor:
 
     def __init__(self, rules: Rules, report: Report) -> None:
         """Begin disarmed; ``report`` takes every transition with its cause."""
-        self.state, self.failure = State.DISARMED, None
+        self.state, self.failure = SafetyState.DISARMED, None
         self._rules, self._report = rules, report
         self._stopping_since = 0.0
 
@@ -101,126 +101,126 @@ class Supervisor:
     @property
     def armed(self) -> bool:
         """Whether the drives are on because of this program."""
-        return self.state in (*_MOVING, State.ZEROING, State.STOPPING)
+        return self.state in (*_MOVING, SafetyState.ZEROING, SafetyState.STOPPING)
 
-    def check_ready(self, sight: Sight, *, confirmed: bool) -> None:
+    def check_ready(self, health: Health, *, confirmed: bool) -> None:
         """Find out whether the drives may be armed.
 
         Args:
-            sight: What is known now.
+            health: What is known now.
             confirmed: The operator has agreed.
 
         Raises:
             ArmingRefusedError: With every condition that is not met.
         """
-        reasons = list(_refusals(sight, self._rules))
+        reasons = list(_refusals(health, self._rules))
         if not confirmed:
             reasons.append("the operator has not agreed (--yes)")
-        if self.state is not State.DISARMED:
+        if self.state is not SafetyState.DISARMED:
             reasons.append(f"the supervisor is {self.state}")
         if reasons:
-            latched = sight.status is not None and (sight.status.fault or sight.status.watchdog)
+            latched = health.status is not None and (health.status.fault or health.status.watchdog)
             raise ArmingRefusedError(reasons, hint=RESET_HINT if latched else "")
 
     def arm(self, cause: str) -> None:
-        """The drives are on and echo what they are sent."""
-        self._go(State.ARMED, "info", cause)
+        """Note that the drives are on and echo what they are sent."""
+        self._go(SafetyState.ARMED, "info", cause)
 
     def begin_zeroing(self) -> None:
         """Let the drives be zeroed."""
-        self._go(State.ZEROING, "info", "tension-zero asked for")
+        self._go(SafetyState.ZEROING, "info", "tension-zero asked for")
 
     def end_zeroing(self, cause: str) -> None:
-        """Zeroing is over."""
-        self._go(State.DISARMED, "info", cause)
+        """Note that zeroing is over."""
+        self._go(SafetyState.DISARMED, "info", cause)
 
     def run(self) -> None:
-        """The first command of the controller is about to be sent."""
-        if self.state is State.ARMED:
-            self._go(State.RUNNING, "info", "first command")
+        """Note that the first command of the controller is about to be sent."""
+        if self.state is SafetyState.ARMED:
+            self._go(SafetyState.RUNNING, "info", "first command")
 
-    def watch(self, now: float, sight: Sight) -> State:
+    def watch(self, now: float, health: Health) -> SafetyState:
         """Look at a cycle and return the state from now on; ``failure`` says why the run must end if it must.
 
         Args:
             now: Time of a clock that never jumps [s].
-            sight: What is known.
+            health: What is known.
         """
         if self.state not in _MOVING:
             return self.state
-        doubt = _doubt(sight, self._rules)
-        if fault := _fault(sight.status):
-            self._end(now, State.FAULTED, RigStopError(fault, hint=RESET_HINT))
-        elif failure := self._reason_to_stop(sight):
-            self._end(now, State.STOPPING, failure)
-        elif doubt and self.state is State.RUNNING:
-            self._go(State.HOLDING, "warning", doubt)
-        elif not doubt and self.state is State.HOLDING:
-            self._go(State.RUNNING, "info", "cameras and drives are well again")
+        doubt = _doubt(health, self._rules)
+        if fault := _fault(health.status):
+            self._end(now, SafetyState.FAULTED, RigStopError(fault, hint=RESET_HINT))
+        elif failure := self._reason_to_stop(health):
+            self._end(now, SafetyState.STOPPING, failure)
+        elif doubt and self.state is SafetyState.RUNNING:
+            self._go(SafetyState.HOLDING, "warning", doubt)
+        elif not doubt and self.state is SafetyState.HOLDING:
+            self._go(SafetyState.RUNNING, "info", "cameras and drives are well again")
         return self.state
 
     def stop(self, now: float, cause: str) -> None:
         """Bring the drives to a controlled stop; nothing happens if they are not armed or stop already."""
         if self.state in _MOVING:
             self._stopping_since = now
-            self._go(State.STOPPING, "info", cause)
+            self._go(SafetyState.STOPPING, "info", cause)
 
-    def rest(self, now: float, sight: Sight, *, moved: bool) -> State:
+    def rest(self, now: float, health: Health, *, moved: bool) -> SafetyState:
         """Follow a controlled stop to its end.
 
         Args:
             now: Time [s].
-            sight: What is known; the cameras do not matter any more.
+            health: What is known; the cameras do not matter any more.
             moved: Whether a drive has moved since the cycle before.
         """
-        if self.state is not State.STOPPING:
+        if self.state is not SafetyState.STOPPING:
             return self.state
-        status = None if sight.silence > 0.0 else sight.status
+        status = None if health.silence > 0.0 else health.status
         waited = now - self._stopping_since
         if fault := _fault(status, enabled=False):
-            self._end(now, State.FAULTED, RigStopError(fault, hint=RESET_HINT))
+            self._end(now, SafetyState.FAULTED, RigStopError(fault, hint=RESET_HINT))
         elif status is not None and not (status.stopping or status.enabled or moved):
-            self._go(State.DISARMED, "info", f"standstill after {waited:.2f} s")
+            self._go(SafetyState.DISARMED, "info", f"standstill after {waited:.2f} s")
         elif waited > self._rules.standstill:
-            why = sight.trouble if status is None else "the drives are still moving"
+            why = health.trouble if status is None else "the drives are still moving"
             text = (
                 f"no standstill within {waited:.2f} s ({why}); the watchdog of the PLC has to stop the drives"
             )
-            self._end(now, State.FAULTED, DeviceError(text, hint=RESET_HINT))
+            self._end(now, SafetyState.FAULTED, DeviceError(text, hint=RESET_HINT))
         return self.state
 
     def reset(self) -> None:
-        """An operator has removed the cause of a fault."""
-        if self.state is State.FAULTED:
+        """Note that an operator has removed the cause of a fault."""
+        if self.state is SafetyState.FAULTED:
             self.failure = None
-            self._go(State.DISARMED, "info", "reset by the operator")
+            self._go(SafetyState.DISARMED, "info", "reset by the operator")
 
-    def _reason_to_stop(self, sight: Sight) -> TcrctlError | None:
-        rules, status = self._rules, sight.status
-        if sight.hopeless or sight.silence >= rules.silence:
+    def _reason_to_stop(self, health: Health) -> TcrctlError | None:
+        rules, status = self._rules, health.status
+        if health.hopeless or health.silence >= rules.silence:
             return DeviceError(
-                f"safety stop of the rig: the drives have not answered for {1e3 * sight.silence:.0f} ms: "
-                f"{sight.trouble}"
+                f"safety stop of the rig: the drives have not answered for {1e3 * health.silence:.0f} ms: "
+                f"{health.trouble}"
             )
-        if sight.age >= rules.stale_stop:
+        if health.age >= rules.stale_stop:
             return RigStopError(
-                f"no usable measurement for {1e3 * sight.age:.0f} ms, limit {1e3 * rules.stale_stop:.0f} ms"
+                f"no usable measurement for {1e3 * health.age:.0f} ms, limit {1e3 * rules.stale_stop:.0f} ms"
             )
-        if sight.following > rules.following or (status is not None and status.following_error):
+        if health.following > rules.following or (status is not None and status.following_error):
             return RigStopError(
-                f"cable {sight.laggard} is {sight.following / 1e3:.2f} mm from its set-point, "
+                f"cable {health.laggard} is {health.following / 1e3:.2f} mm from its set-point, "
                 f"limit {rules.following / 1e3:.2f} mm"
             )
-        if sight.refused >= rules.rejects and status is not None:
-            return RigStopError(f"the PLC refused {sight.refused} set-points in a row: {_refusal(status)}")
+        if health.refused >= rules.rejects and status is not None:
+            return RigStopError(f"the PLC refused {health.refused} set-points in a row: {_refusal(status)}")
         return None
 
-    def _end(self, now: float, state: State, failure: TcrctlError) -> None:
+    def _end(self, now: float, state: SafetyState, failure: TcrctlError) -> None:
         self.failure = self.failure or failure
         self._stopping_since = now
         self._go(state, "error", str(failure))
 
-    def _go(self, state: State, level: str, cause: str) -> None:
+    def _go(self, state: SafetyState, level: str, cause: str) -> None:
         if state not in _NEXT[self.state]:
             raise RuntimeError(f"the supervisor cannot go from {self.state} to {state}: {cause}")
         before, self.state = self.state, state
@@ -228,7 +228,7 @@ class Supervisor:
 
 
 def _fault(status: DriveStatus | None, *, enabled: bool = True) -> str:
-    """What the drives report that ends a run at once and is latched; empty if all is well."""
+    """Say what of the drives' report ends a run at once and is latched; empty if all is well."""
     if status is None:
         return ""
     if status.estop:
@@ -242,14 +242,14 @@ def _fault(status: DriveStatus | None, *, enabled: bool = True) -> str:
     return ""
 
 
-def _doubt(sight: Sight, rules: Rules) -> str:
-    """Why the drives shall be held for now; empty if all is well."""
-    if sight.trouble:
-        return f"no answer of the drives: {sight.trouble}"
-    if sight.age >= rules.stale:
-        return f"no usable measurement for {1e3 * sight.age:.0f} ms"
-    if sight.refused and sight.status is not None:
-        return f"the PLC refused a set-point: {_refusal(sight.status)}"
+def _doubt(health: Health, rules: Rules) -> str:
+    """Return why the drives shall be held for now; empty if all is well."""
+    if health.trouble:
+        return f"no answer of the drives: {health.trouble}"
+    if health.age >= rules.stale:
+        return f"no usable measurement for {1e3 * health.age:.0f} ms"
+    if health.refused and health.status is not None:
+        return f"the PLC refused a set-point: {_refusal(health.status)}"
     return ""
 
 
@@ -257,11 +257,11 @@ def _refusal(status: DriveStatus) -> str:
     return status.reject or "it was not acknowledged"
 
 
-def _refusals(sight: Sight, rules: Rules) -> list[str]:
-    """Everything that stands against arming."""
-    status, reasons = sight.status, []
-    if status is None or sight.trouble:
-        return [f"the drives do not answer {sight.trouble}".strip()]
+def _refusals(health: Health, rules: Rules) -> list[str]:
+    """Return everything that stands against arming."""
+    status, reasons = health.status, []
+    if status is None or health.trouble:
+        return [f"the drives do not answer {health.trouble}".strip()]
     if fault := _fault(status, enabled=False):
         reasons.append(fault)
     if not status.zeroed:
@@ -270,8 +270,8 @@ def _refusals(sight: Sight, rules: Rules) -> list[str]:
         reasons.append("the PLC is not switched to remote")
     if not status.acknowledged:
         reasons.append("the PLC does not acknowledge")
-    if sight.age == math.inf:
+    if health.age == math.inf:
         reasons.append("the cameras have shown no usable measurement")
-    elif not sight.age < rules.stale:
-        reasons.append(f"the newest usable measurement is {1e3 * sight.age:.0f} ms old")
+    elif not health.age < rules.stale:
+        reasons.append(f"the newest usable measurement is {1e3 * health.age:.0f} ms old")
     return reasons

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from tcr_hardware.emulators.motive import MotiveEmulator
 from tcr_hardware.emulators.motive_faults import MotiveFaults
+from tcr_hardware.emulators.motive_markers import OCCLUDED, SEEN, UNLABELLED, TrackedMarkers
 from tcr_hardware.emulators.motive_outbox import Outbox
-from tcr_hardware.emulators.motive_scene import OCCLUDED, SEEN, UNLABELLED, Scene
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 
 NAMES = ["m1.n1", "m1.n2", "m1.n3", "m2.n1", "m2.n2", "m2.n3", "m2.apex", "tip"]
@@ -118,7 +118,7 @@ def test_a_client_that_says_goodbye_gets_nothing_more(command):
         eventually(lambda: motive.clients == 0)
 
 
-def test_an_error_of_the_scene_is_raised_when_the_server_is_stopped():
+def test_an_error_of_the_positions_is_raised_when_the_server_is_stopped():
     shown = iter([POSITIONS])
     motive = MotiveEmulator(NAMES, lambda: next(shown), MotiveSettings(command_port=0, rate_hz=1000.0))
     motive.start()
@@ -135,17 +135,17 @@ def test_what_cannot_be_served_is_refused():
             serve(**wrong)
 
 
-# ---- the scene ----
+# ---- what is tracked ----
 
 
 def look(**faults):
-    scene = Scene(NAMES, POSITIONS)
-    return scene, scene.view(POSITIONS, MotiveFaults(**faults))
+    tracked = TrackedMarkers(NAMES, POSITIONS)
+    return tracked, tracked.view(POSITIONS, MotiveFaults(**faults))
 
 
 def test_bodies_are_named_by_the_first_part_of_the_marker_names():
-    scene, view = look()
-    assert [(body.name, body.markers) for body in scene.bodies] == [
+    tracked, view = look()
+    assert [(body.name, body.markers) for body in tracked.bodies] == [
         ("m1", ("n1", "n2", "n3")),
         ("m2", ("n1", "n2", "n3", "apex")),
         ("markers", ("tip",)),
@@ -156,9 +156,9 @@ def test_bodies_are_named_by_the_first_part_of_the_marker_names():
 
 
 def test_the_orientation_of_a_body_is_its_rotation_since_it_was_defined():
-    scene = Scene(NAMES, POSITIONS)
+    tracked = TrackedMarkers(NAMES, POSITIONS)
     turn = Rotation.from_rotvec([0.3, -0.5, 0.2])
-    view = scene.view(turn.apply(POSITIONS) + 5.0, MotiveFaults())
+    view = tracked.view(turn.apply(POSITIONS) + 5.0, MotiveFaults())
     assert view.body_orientations[:2] == pytest.approx(np.tile(turn.as_quat(), (2, 1)))
     assert view.body_orientations[2].tolist() == [0, 0, 0, 1]  # one marker has no orientation
 
@@ -183,7 +183,7 @@ def test_faults_of_position_are_shown():
     assert not view.body_tracked.any()
 
 
-def test_a_scene_without_names_is_a_cloud_of_points():
+def test_markers_without_names_are_a_cloud_of_points():
     _, view = look(unlabelled=True, missing=frozenset(["tip"]))
     assert len(view.unlabelled) == 7
     assert (view.params == UNLABELLED).all()

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tcr_hardware.emulators.plc_program import PlcCommand, PlcLimitSettings, PlcProgram
-from tcr_hardware.modbus.registers import Control, Fault, Reject, Status
+from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status
 from tcr_hardware.servo import Servo, ServoSettings
 
 DT = 0.002
@@ -78,7 +78,7 @@ def test_the_speed_cap_of_the_host_holds_and_is_reported():
 def test_the_watchdog_trips_when_the_heartbeat_stands_still_and_not_before(silence_ms):
     host = Host().following()
     host.wait(round(silence_ms / 1e3 / DT) - 25)  # the last set was followed by 25 scans
-    assert (host.plc.fault is Fault.WATCHDOG) == (silence_ms > LIMITS.watchdog_ms)
+    assert (host.plc.fault is FaultCode.WATCHDOG) == (silence_ms > LIMITS.watchdog_ms)
 
 
 def test_a_tripped_watchdog_ramps_down_holds_and_stays_latched_until_a_reset_and_a_new_enable():
@@ -86,7 +86,7 @@ def test_a_tripped_watchdog_ramps_down_holds_and_stays_latched_until_a_reset_and
     for k in range(1, 6):
         host.send(FOLLOW, 2_500.0 * k, 0.0, scans=25)
     host.send(FOLLOW, 18_400.0, 0.0, vmax=20_000.0, scans=102)  # still on its way when the watchdog trips
-    assert host.plc.fault is Fault.WATCHDOG
+    assert host.plc.fault is FaultCode.WATCHDOG
     host.wait(50)
     held = list(host.plc.active)
     assert 12_500.0 < held[0] < 18_000.0
@@ -97,7 +97,7 @@ def test_a_tripped_watchdog_ramps_down_holds_and_stays_latched_until_a_reset_and
     assert host.plc.reject[0] is Reject.NOT_ENABLED
     assert {Status.WATCHDOG, Status.FAULT} <= set(host.plc.status())
     host.send(ON | Control.RESET)  # ENABLE is held: no edge, so nothing starts
-    assert host.plc.fault is Fault.NONE
+    assert host.plc.fault is FaultCode.NONE
     assert not host.plc.enabled
     host.send(Control.RUN)
     assert host.send(ON).enabled
@@ -185,7 +185,7 @@ def test_a_jammed_axis_is_a_following_error_and_does_not_jump_when_it_comes_free
     host.plc.servos[1].jammed = True
     for k in range(1, 8):
         host.send(FOLLOW, 2_000.0 * k, 2_000.0 * k)
-    assert host.plc.fault is Fault.FOLLOWING_ERROR
+    assert host.plc.fault is FaultCode.FOLLOWING_ERROR
     host.plc.servos[1].jammed = False
     host.wait(200)
     assert host.plc.positions()[1] == pytest.approx(0.0, abs=1e-6)
@@ -267,7 +267,7 @@ def test_a_drive_arrives_without_overshoot_within_its_speed_and_acceleration(to,
     servo, before = Servo(limits), 0.0
     duration = abs(to) / speed + 12 * lag + 2 * (abs(to) / acceleration) ** 0.5 + speed / acceleration
     for _ in range(round(duration / DT) + 2):
-        servo.step(to, DT)
+        servo.advance(to, DT)
         assert abs(servo.speed) <= speed * (1 + 1e-12)
         assert abs(servo.speed - before) <= acceleration * DT * (1 + 1e-9) + 1e-9
         assert min(0.0, to) - 1e-3 <= servo.position <= max(0.0, to) + 1e-3
@@ -278,7 +278,7 @@ def test_a_drive_arrives_without_overshoot_within_its_speed_and_acceleration(to,
 def test_a_drive_follows_a_ramp_late_by_its_lag():
     servo, speed = Servo(ServoSettings(lag_s=0.04)), 20_000.0
     for k in range(500):
-        servo.step(speed * k * DT, DT)
+        servo.advance(speed * k * DT, DT)
     assert speed * 499 * DT - servo.position == pytest.approx(speed * (0.04 - DT), rel=0.05)
 
 
@@ -286,9 +286,9 @@ def test_play_keeps_the_cable_still_when_the_drive_turns_round():
     servo = Servo(ServoSettings(backlash_um=200.0))
     for target in (1_000.0, 900.0):
         for _ in range(300):
-            servo.step(target, DT)
+            servo.advance(target, DT)
     assert servo.position == pytest.approx(900.0, abs=1.0)
     assert servo.output == pytest.approx(900.0, abs=1.0)  # 1000 - half the play on the way in
     for _ in range(300):
-        servo.step(700.0, DT)
+        servo.advance(700.0, DT)
     assert servo.output == pytest.approx(800.0, abs=1.0)

@@ -56,9 +56,12 @@ def test_a_command_block_has_these_bytes():
 
 
 def test_a_status_block_with_these_bytes_is_read_so():
-    words = struct.unpack(">18H", bytes.fromhex(
-        "0519 0001 0007 1233 0023 ffff 0000 30d4 ffff ffff 0000 0000 0001 1170 ffff 15a0 8000 0000"
-    ))  # fmt: skip
+    words = struct.unpack(
+        ">18H",
+        bytes.fromhex(
+            "0519 0001 0007 1233 0023 ffff 0000 30d4 ffff ffff 0000 0000 0001 1170 ffff 15a0 8000 0000"
+        ),
+    )
     status = Blocks(MAP, WordCodec()).status(words, Counters(0x1234, 7), 5.0, 4.5, 2)
     assert status.status == Status.READY | Status.FAULT | Status.ESTOP | Status.WATCHDOG | Status.IN_POSITION
     assert (status.fault, status.heartbeat_echo, status.seq_ack, status.ack_lag) == (1, 7, 0x1233, 1)

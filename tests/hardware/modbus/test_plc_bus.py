@@ -146,9 +146,14 @@ def test_a_plc_with_either_word_order_is_understood_when_the_order_may_be_any(lo
 
 
 def test_a_site_may_have_its_own_addresses_and_formats(wire):
-    changes = {"SP": {"address": 40, "kind": "float32", "scale": 1000.0}, "CTRL": {"address": 38},
-               "HEARTBEAT": {"address": 39}, "VMAX": {"address": 52}, "SEQ": {"address": 53},
-               "ACT": {"scale": 10.0}}  # fmt: skip
+    changes = {
+        "SP": {"address": 40, "kind": "float32", "scale": 1000.0},
+        "CTRL": {"address": 38},
+        "HEARTBEAT": {"address": 39},
+        "VMAX": {"address": 52},
+        "SEQ": {"address": 53},
+        "ACT": {"scale": 10.0},
+    }
     rows = register_map(6, changes)
     with PlcEmulator(replace(CALM, map=rows)) as plc:
         plc.start(rtu="pty")

@@ -100,8 +100,13 @@ def test_the_encoder_of_the_tests_writes_the_golden_frame(version):
         unlabelled=[(4, 5, 6)],
         bodies=[(9, (1, 2, 3), (0, 0, 0, 1), 0.5, 1, [((1, 2, 3), 3, 0.01)])],
         markers=[(65538, (1, 2, 3), 0.01, 10, 0.5)],
-        latency=0.5, timecode=(10, 11), timestamp=0.5, ticks=(1, 2, 3), precision=(4, 5), params=1,
-    )  # fmt: skip
+        latency=0.5,
+        timecode=(10, 11),
+        timestamp=0.5,
+        ticks=(1, 2, 3),
+        precision=(4, 5),
+        params=1,
+    )
     assert wire.frame_payload(version, content).hex() == "07000000" + "".join(GOLDEN[version])
 
 

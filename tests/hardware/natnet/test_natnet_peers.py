@@ -21,22 +21,24 @@ from tcr_hardware.emulators import motive_encoder as encoder
 from tcr_hardware.emulators.motive import MotiveEmulator
 from tcr_hardware.emulators.motive_encoder import Stamp
 from tcr_hardware.emulators.motive_faults import MotiveFaults
-from tcr_hardware.emulators.motive_scene import Scene
+from tcr_hardware.emulators.motive_markers import TrackedMarkers
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 
 NAMES = [f"m{i}.n{j}" for i in range(1, 14) for j in (1, 2, 3)]
 POSITIONS = np.random.default_rng(4).normal(size=(39, 3))
 AS_SENT = POSITIONS.astype(np.float32)
-SCENE = Scene(NAMES, POSITIONS)
+TRACKED = TrackedMarkers(NAMES, POSITIONS)
 STAMP = Stamp(123, 0.5, 10_000, 20_000, 30_000, 0.0012, 2)
 HIDDEN = MotiveFaults(occluded=frozenset(["m3.n2"]), missing=frozenset(["m1.n1"]))
 ID_OF = {
-    name: body.id << 16 | k + 1 for body in SCENE.bodies for k, name in enumerate(NAMES[i] for i in body.rows)
+    name: body.id << 16 | k + 1
+    for body in TRACKED.bodies
+    for k, name in enumerate(NAMES[i] for i in body.rows)
 }
 
 
 def sent(version, faults=None):
-    payload = encoder.frame(version, STAMP, SCENE, SCENE.view(POSITIONS, faults or MotiveFaults()))
+    payload = encoder.frame(version, STAMP, TRACKED, TRACKED.view(POSITIONS, faults or MotiveFaults()))
     return encoder.packet(7, payload)
 
 
@@ -78,7 +80,7 @@ def test_natnet_reads_our_definitions(version):
     natnet = pytest.importorskip("natnet", reason="the PyPI client natnet is not installed")
     from natnet.packet_buffer import PacketBuffer
 
-    buffer = PacketBuffer(encoder.models(version, SCENE))
+    buffer = PacketBuffer(encoder.models(version, TRACKED))
     models = natnet.DataDescriptions.read_from_buffer(buffer, natnet.Version(*version))
     assert buffer.pointer == len(buffer.data)
     assert [each.name for each in models.rigid_bodies] == [f"m{i}" for i in range(1, 14)]
@@ -139,7 +141,7 @@ def test_the_vendors_client_reads_our_frames(version):
 
 @pytest.mark.parametrize("version", [(3, 0), (3, 1), (4, 0), (4, 1)])
 def test_the_vendors_client_reads_our_definitions(version):
-    client, payload = vendor(), encoder.models(version, SCENE)
+    client, payload = vendor(), encoder.models(version, TRACKED)
     with contextlib.redirect_stdout(io.StringIO()):
         offset, models = client._NatNetClient__unpack_data_descriptions(payload, len(payload), *version)
     assert offset == len(payload)
@@ -172,7 +174,7 @@ def test_the_vendors_requests_are_understood_by_our_server():
         client.send_request(command, client.NAT_REQUEST, "Bitstream", motive.address)
         assert received(command, 3) == b"Bitstream,4.1\0"  # which its CONNECT had asked for
         client.send_request(command, client.NAT_REQUEST_MODELDEF, "", motive.address)
-        assert received(command, 5) == encoder.models((4, 1), SCENE)
+        assert received(command, 5) == encoder.models((4, 1), TRACKED)
         frame = received(command, 7)
         _, data = client._NatNetClient__unpack_mocap_data(frame, len(frame), 4, 1)
     assert len(data.labeled_marker_data.labeled_marker_list) == 39
@@ -222,19 +224,23 @@ def test_optirx_reads_our_server_info():
 
 @pytest.mark.parametrize("version", wire.VERSIONS)
 def test_our_server_and_the_encoder_of_the_tests_write_the_same_bytes(version):
-    view = SCENE.view(POSITIONS, HIDDEN)
+    view = TRACKED.view(POSITIONS, HIDDEN)
     lost = POSITIONS.copy()
     lost[0] = 0.0
     content = wire.Wire(
         number=123,
-        sets=[(body.name, lost[body.rows]) for body in SCENE.bodies] + [("all", lost)],
+        sets=[(body.name, lost[body.rows]) for body in TRACKED.bodies] + [("all", lost)],
         bodies=[
             (
-                body.id, p, q, encoder.RESIDUAL, int(t),
+                body.id,
+                p,
+                q,
+                encoder.RESIDUAL,
+                int(t),
                 [(lost[row], k + 1, 0.008) for k, row in enumerate(body.rows)],
             )
             for body, p, q, t in zip(
-                SCENE.bodies, view.body_positions, view.body_orientations, view.body_tracked, strict=True
+                TRACKED.bodies, view.body_positions, view.body_orientations, view.body_tracked, strict=True
             )
         ],
         markers=[
@@ -242,6 +248,9 @@ def test_our_server_and_the_encoder_of_the_tests_write_the_same_bytes(version):
             for row, name in enumerate(NAMES)
             if name != "m1.n1"
         ],
-        latency=0.0012, timestamp=0.5, ticks=(10_000, 20_000, 30_000), params=2,
-    )  # fmt: skip
+        latency=0.0012,
+        timestamp=0.5,
+        ticks=(10_000, 20_000, 30_000),
+        params=2,
+    )
     assert sent(version, HIDDEN)[4:] == wire.frame_payload(version, content)

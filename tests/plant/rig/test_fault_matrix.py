@@ -10,12 +10,22 @@ import time
 import numpy as np
 import pytest
 
-from support.fault_matrix import BEFORE, CASES, PATIENT, Bench, Loop, bound, play, suite_cells, violations
+from support.fault_matrix import (
+    BEFORE,
+    CASES,
+    PATIENT,
+    Loop,
+    WatchedEmulators,
+    bound,
+    play,
+    suite_cells,
+    violations,
+)
 from tcr_hardware.modbus.registers import Status
 from tcrctl.commissioning.zero import reset_rig
 from tcrctl.errors import ArmingRefusedError, InputError, RigStopError
-from tcrctl.plant.rig.bench import build_rig
-from tcrctl.plant.rig.session import Session
+from tcrctl.plant.rig.assembly import build_rig
+from tcrctl.plant.rig.operation import Operation
 
 #: What a busy computer may add to any time [s].
 LATE = 1.0
@@ -45,34 +55,34 @@ def test_faults_that_do_no_harm_do_not_stop_the_run(tcr5x4):
     """One after the other in one run; a busy computer may hold it in between."""
     harmless = [case for case in CASES if case.moving == "running"]
     assert len(harmless) > 10
-    with Bench(tcr5x4, PATIENT, WATCHDOG_MS) as bench:
-        plant = bench.plant()
+    with WatchedEmulators(tcr5x4, PATIENT, WATCHDOG_MS) as emulators:
+        plant = emulators.plant()
         plant.start()
         loop = Loop(plant)
         loop.run(BEFORE)
         for case in harmless:
-            bench.fail(case)
+            emulators.fail(case)
             loop.run(0.15)
-            bench.heal()
+            emulators.heal()
             loop.run(0.05)
         assert str(plant.supervisor.state) in ("running", "holding")
         plant.close()
         assert str(plant.supervisor.state) == "disarmed"
-        sent = np.array(bench.sent)[:, :4]
+        sent = np.array(emulators.sent)[:, :4]
     assert len(sent) > 50
     assert np.abs(np.diff(sent, axis=0)).max() <= 500
 
 
 @pytest.mark.slow
 def test_the_watchdog_catches_a_controller_that_hangs(tcr5x4):
-    with Bench(tcr5x4, PATIENT, watchdog_ms=150) as bench:
-        plant = bench.plant()
+    with WatchedEmulators(tcr5x4, PATIENT, watchdog_ms=150) as emulators:
+        plant = emulators.plant()
         plant.start()
         loop = Loop(plant)
         loop.run(0.1)
         time.sleep(0.4)
-        assert Status.WATCHDOG in bench.plc.snapshot()["status"]
-        assert Status.ENABLED not in bench.plc.snapshot()["status"]
+        assert Status.WATCHDOG in emulators.plc.snapshot()["status"]
+        assert Status.ENABLED not in emulators.plc.snapshot()["status"]
         with pytest.raises(RigStopError, match="watchdog"):
             loop.run(1.0)
         plant.close()
@@ -80,41 +90,47 @@ def test_the_watchdog_catches_a_controller_that_hangs(tcr5x4):
 
 
 def test_after_a_fault_nothing_is_armed_until_an_operator_has_reset_it(tcr5x4):
-    with Bench(tcr5x4, PATIENT, WATCHDOG_MS) as bench:
-        bench.plc.press_estop()
+    with WatchedEmulators(tcr5x4, PATIENT, WATCHDOG_MS) as emulators:
+        emulators.plc.press_estop()
         time.sleep(0.02)
         names = tcr5x4.cable_names
-        agreed, not_agreed = Session(confirmed=True), Session(confirmed=False)
+        agreed, not_agreed = Operation(confirmed=True), Operation(confirmed=False)
         with pytest.raises(ArmingRefusedError, match="emergency stop is pressed"):
-            reset_rig(bench.loaded(), names, agreed, dry_run=False)
-        bench.plc.release_estop()
-        plant = bench.plant()
+            reset_rig(emulators.loaded(), names, agreed, dry_run=False)
+        emulators.plc.release_estop()
+        plant = emulators.plant()
         with pytest.raises(ArmingRefusedError, match="fault"):
             plant.start()
         plant.close()
         with pytest.raises(ArmingRefusedError, match="--yes"):
-            reset_rig(bench.loaded(), names, not_agreed, dry_run=False)
-        assert reset_rig(bench.loaded(), names, agreed, dry_run=True)["cleared"] is False
-        assert reset_rig(bench.loaded(), names, agreed, dry_run=False)["cleared"] is True
-        assert reset_rig(bench.loaded(), names, agreed, dry_run=False) == {"fault": None, "cleared": False}
-        plant = bench.plant()
+            reset_rig(emulators.loaded(), names, not_agreed, dry_run=False)
+        assert reset_rig(emulators.loaded(), names, agreed, dry_run=True)["cleared"] is False
+        assert reset_rig(emulators.loaded(), names, agreed, dry_run=False)["cleared"] is True
+        assert reset_rig(emulators.loaded(), names, agreed, dry_run=False) == {
+            "fault": None,
+            "cleared": False,
+        }
+        plant = emulators.plant()
         plant.start()
         plant.close()
         assert str(plant.supervisor.state) == "disarmed"
 
 
 def test_a_rig_file_that_allows_more_than_the_plc_is_refused(tcr5x4):
-    with Bench(tcr5x4, {**PATIENT, "max_step_mm": 7.0}, WATCHDOG_MS, high_mm=30) as bench:
+    with WatchedEmulators(tcr5x4, {**PATIENT, "max_step_mm": 7.0}, WATCHDOG_MS, high_mm=30) as emulators:
         with pytest.raises(InputError) as caught:
-            bench.plant()
+            emulators.plant()
         assert "cable c3: -20 to 30 mm on axis 3, PLC -25 to 25 mm" in str(caught.value)
         assert "max_step_mm 7 mm, PLC 6 mm" in str(caught.value)
-    with Bench(tcr5x4, PATIENT, watchdog_ms=200) as bench, pytest.raises(InputError, match="watchdog"):
-        build_rig(bench.loaded(), tcr5x4, 0.15, Session())
+    with (
+        WatchedEmulators(tcr5x4, PATIENT, watchdog_ms=200) as emulators,
+        pytest.raises(InputError, match="watchdog"),
+    ):
+        build_rig(emulators.loaded(), tcr5x4, 0.15, Operation())
 
 
 def test_a_label_that_the_cameras_do_not_know_is_refused(tcr5x4):
-    with Bench(tcr5x4, PATIENT, WATCHDOG_MS) as bench:
-        bench.motive.change_models([f"marker.{i}" for i in range(15)])
+    with WatchedEmulators(tcr5x4, PATIENT, WATCHDOG_MS) as emulators:
+        emulators.motive.change_models([f"marker.{i}" for i in range(15)])
         with pytest.raises(InputError, match=r"tracks no marker m1.n1"):
-            bench.plant()
+            emulators.plant()

@@ -41,18 +41,32 @@ def changed(tmp_path, old, new):
 
 MISTAKES = {
     "two drives on one axis": ("c2: {axis: 2", "c2: {axis: 1", "axis 1 already drives cable c1"),
-    "limits the wrong way round": ("min_mm: -30, max_mm: 90", "min_mm: 90, max_mm: -30", "greater than min_mm"),
+    "limits the wrong way round": (
+        "min_mm: -30, max_mm: 90",
+        "min_mm: 90, max_mm: -30",
+        "greater than min_mm",
+    ),
     "unknown antagonist": ("[c1, c2, c3]", "[c1, c2, c7]", "there is no cable c7; known: c1, c2, c3"),
     "no such brace": ("tcr600_m{ring}.n{node}", "tcr600_m{row}.n{node}", "may contain {ring} and {node}"),
     "no rotation": ("[0.6532814824, ", "[0.9, ", "must have length 1"),
-    "half an identity": ("n{node}', base", "n{node}', nodes: [{node: m1.n1, asset: 3}], base", "belong together"),
+    "half an identity": (
+        "n{node}', base",
+        "n{node}', nodes: [{node: m1.n1, asset: 3}], base",
+        "belong together",
+    ),
     "two identities": (
-        "n{node}', base", "n{node}', nodes: [{node: m1.n1, label: a.b, asset: 3, member: 1}], base", "not both"
+        "n{node}', base",
+        "n{node}', nodes: [{node: m1.n1, label: a.b, asset: 3, member: 1}], base",
+        "not both",
     ),
     "unknown key": ("up_axis: y", "up: y", "unknown key"),
     "wrong kind": ("kind: natnet", "kind: vicon", "must be 'natnet'"),
-    "times the wrong way round": ("stale_stop_ms: 400", "stale_stop_ms: 40", "greater than stale_after_ms, 100"),
-}  # fmt: skip
+    "times the wrong way round": (
+        "stale_stop_ms: 400",
+        "stale_stop_ms: 40",
+        "greater than stale_after_ms, 100",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", MISTAKES)
@@ -68,10 +82,18 @@ def test_a_mistake_in_a_rig_file_has_its_place(name, tmp_path):
 
 MISFITS = {
     "cable without drive": ("      c3: {axis: 3, min_mm: -30, max_mm: 90}\n", "", "c3"),
-    "drive without cable": ("cables:\n", "cables:\n      c0: {axis: 6, min_mm: -1, max_mm: 1}\n", "no cable c0"),
+    "drive without cable": (
+        "cables:\n",
+        "cables:\n      c0: {axis: 6, min_mm: -1, max_mm: 1}\n",
+        "no cable c0",
+    ),
     "wider than the robot": ("min_mm: -30", "min_mm: -130", "stroke_mm of tcr600, -100 to 200"),
-    "ring that is not there": ("n{node}', base: 'tcr600", "n{node}', rings: [12], base: 'tcr600", "no ring 12"),
-}  # fmt: skip
+    "ring that is not there": (
+        "n{node}', base: 'tcr600",
+        "n{node}', rings: [12], base: 'tcr600",
+        "no ring 12",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", MISFITS)

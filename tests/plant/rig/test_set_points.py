@@ -69,7 +69,7 @@ def test_a_start_outside_the_stroke_can_only_move_inwards():
         (0.08, {}, "speed limit", 80.0, 50.0, "mm/s"),
         (-0.08, {}, "speed limit", -80.0, -50.0, "mm/s"),
         (0.04, {"acceleration": np.full(M, 200_000.0)}, "acceleration limit", 40.0, 10.0, "mm/s"),
-        (0.04, {"step": np.full(M, 1500)}, "step limit", 2.0, 1.5, "mm"),
+        (0.04, {"change": np.full(M, 1500)}, "step limit", 2.0, 1.5, "mm"),
         (0.04, {"high": np.full(M, 900)}, "stroke limit", 2.0, 0.9, "mm"),
         (np.inf, {}, "not a finite number", np.inf, 0.0, "mm/s"),
     ],

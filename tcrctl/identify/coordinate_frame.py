@@ -16,7 +16,7 @@ from tcrctl.signals import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class CoordinateFrame:
     """Where the frame lies, and what of it is unknown.
 
     Attributes:
@@ -34,8 +34,8 @@ class Frame:
     free_offset: bool
 
     @classmethod
-    def of(cls, settings: FrameSettings) -> Frame:
-        """The frame as far as it is known; ``mirrored: try`` begins with no."""
+    def of(cls, settings: FrameSettings) -> CoordinateFrame:
+        """Return the frame as far as it is known; ``mirrored: try`` begins with no."""
         return cls(
             yaw=math.radians(settings.yaw_deg),
             offset=np.array(settings.offset_mm) / 1e3,
@@ -49,13 +49,13 @@ class Frame:
         """Values of what is unknown: yaw, then offset; (0,), (1,), (3,) or (4,)."""
         return np.concatenate([[self.yaw] * self.free_yaw, self.offset if self.free_offset else []])
 
-    def with_unknowns(self, values: Array) -> Frame:
-        """The frame with other values of what is unknown."""
+    def with_unknowns(self, values: Array) -> CoordinateFrame:
+        """Return the frame with other values of what is unknown."""
         yaw = float(values[0]) if self.free_yaw else self.yaw
         return replace(self, yaw=yaw, offset=values[-3:] if self.free_offset else self.offset)
 
     def turned(self, model: Array) -> Array:
-        """Vectors (..., 3) of the robot's frame in the measurement's frame."""
+        """Return the vectors (..., 3) of the robot's frame in the measurement's frame."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         if self.mirrored:
@@ -64,11 +64,11 @@ class Frame:
         return out
 
     def place(self, model: Array) -> Array:
-        """Positions (n, 3) [m] of the robot's frame in the measurement's frame."""
+        """Return the positions (n, 3) [m] of the robot's frame in the measurement's frame."""
         return self.turned(model) + self.offset
 
     def slopes(self, model: Array) -> Array:
-        """Derivative of :meth:`place` with respect to the unknowns (n, 3, unknowns)."""
+        """Return the derivative of :meth:`place` with respect to the unknowns (n, 3, unknowns)."""
         columns: list[Any] = []
         if self.free_yaw:
             turned = self.turned(model)
@@ -77,8 +77,8 @@ class Frame:
             columns += [np.tile(axis, (len(model), 1)) for axis in np.eye(3)]
         return np.stack(columns, axis=2) if columns else np.zeros((*model.shape, 0))
 
-    def aligned(self, model: Array, measured: Array) -> Frame:
-        """The frame with the unknowns that fit best, points not measured (NaN) left out.
+    def aligned(self, model: Array, measured: Array) -> CoordinateFrame:
+        """Return the frame with the unknowns that fit best, points not measured (NaN) left out.
 
         Args:
             model: Positions in the robot's frame (n, 3) [m].
@@ -92,7 +92,8 @@ class Frame:
         yaw = self.yaw
         if self.free_yaw:
             p, q = a - centre[0], b - centre[1]
-            sine, cosine = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum(), (p[:, :2] * q[:, :2]).sum()
+            sine = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()
+            cosine = (p[:, :2] * q[:, :2]).sum()
             yaw = math.atan2(sine, cosine)
         found = replace(self, yaw=yaw)
         if self.free_offset:

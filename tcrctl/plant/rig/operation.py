@@ -1,4 +1,4 @@
-"""What a plant may know of the run that it takes part in."""
+"""What a plant may know of the operation that it takes part in: a run, or work on the bench beside one."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 
 def unheard(kind: str, level: str, text: str) -> None:
-    """Take an event and drop it."""
+    """Discard an event."""
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
-    """The run as a plant sees it.
+class Operation:
+    """A run, or work beside one, as a plant sees it.
 
     Attributes:
         time: Time of the run's steps [s]; 0 before the first one is due.

@@ -29,8 +29,8 @@ class Rules:
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
-    """What is known in one cycle.
+class Health:
+    """What is known of cameras and drives in one cycle.
 
     Attributes:
         age: Age of the newest measurement that can be trusted [s].

@@ -8,11 +8,11 @@ import numpy as np
 
 from tcrctl.errors import InputError
 from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.health import Rules
+from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
-from tcrctl.plant.rig.session import Session
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
 from tcrctl.plant.rig.settings import MountedRobot, SafetyRules
-from tcrctl.plant.rig.sight import Rules
 from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot
 
@@ -35,7 +35,7 @@ def envelope(mounted: MountedRobot, rules: SafetyRules, names: tuple[str, ...]) 
         names=names,
         low=np.array([round(1e3 * cable.min_mm) for cable in cables]),
         high=np.array([round(1e3 * cable.max_mm) for cable in cables]),
-        step=np.full(len(cables), int(1e3 * rules.max_step_mm)),
+        change=np.full(len(cables), int(1e3 * rules.max_step_mm)),
         speed=np.array([1e3 * cable.speed_limit_mm_s for cable in cables]),
         acceleration=np.full(len(cables), np.inf if acceleration is None else 1e3 * acceleration),
         groups=tuple(
@@ -86,14 +86,14 @@ def connect_drives(loaded: LoadedRig, names: tuple[str, ...]) -> ModbusDrives:
     return ModbusDrives(loaded.mounted, names)
 
 
-def build_rig(loaded: LoadedRig, robot: Robot, period: float, session: Session) -> RigPlant:
+def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operation) -> RigPlant:
     """Connect to a rig; nothing moves before it is started.
 
     Args:
         loaded: The rig file.
         robot: The robot that hangs there.
         period: Control period [s].
-        session: The run.
+        operation: The run.
 
     Raises:
         DeviceError: If cameras or drives do not answer.
@@ -120,11 +120,11 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, session: Session) 
         nodes=len(ring_rows(robot.n_modules)),
         arm_timeout=rules.arm_timeout_s,
     )
-    return RigPlant(cameras, drives, limits, period, session)
+    return RigPlant(cameras, drives, limits, period, operation)
 
 
 def _check_period(rules: SafetyRules, period: float) -> None:
-    """A tick must come often enough to notice in time that the cameras have stopped."""
+    """Check that ticks come often enough to notice in time that the cameras have stopped."""
     if 1e3 * period > rules.stale_stop_ms:
         raise InputError(
             f"controller.period_s {period:g} s is longer than safety.stale_stop_ms of the rig, "

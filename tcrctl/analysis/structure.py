@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.elements.torus import point_weights
-from tcrctl.log.geometry import CableRoute
+from tcrctl.log.geometry import CableHoles
 from tcrctl.log.reader import Log
 from tcrctl.log.run_files import RunFiles
 from tcrctl.robot.description import cable_routes, spring_list
@@ -16,23 +16,23 @@ from tcrctl.robot.module import node_count, node_index, ring_nodes
 
 
 @dataclass(frozen=True, slots=True)
-class Skeleton:
+class Structure:
     """Which nodes are joined; node rows as in the notation table (:mod:`tcrctl`).
 
     Attributes:
         springs: End nodes of every spring (n_springs, 2).
         natural_length: Their natural lengths (n_springs,) [m].
-        cables: One route per cable, in the order of the drives.
+        cables: Holes of every cable, in the order of the drives.
         tip_ring: Module whose ring is the end.
     """
 
     springs: NDArray[np.int64]
     natural_length: NDArray[np.float64]
-    cables: tuple[CableRoute, ...]
+    cables: tuple[CableHoles, ...]
     tip_ring: int
 
 
-def read_skeleton(log: Log, n_nodes: int) -> Skeleton | None:
+def read_structure(log: Log, n_nodes: int) -> Structure | None:
     """Find what joins the nodes of a logged robot.
 
     Args:
@@ -48,11 +48,11 @@ def read_skeleton(log: Log, n_nodes: int) -> Skeleton | None:
         return None
     springs = spring_list(robot)
     ends = [[node_index(name) for name in spring.nodes] for spring in springs]
-    return Skeleton(
+    return Structure(
         springs=np.array(ends, dtype=np.int64).reshape(-1, 2),
         natural_length=np.array([spring.natural_length for spring in springs]),
         cables=tuple(
-            CableRoute(
+            CableHoles(
                 name=route.name,
                 nodes=np.array([ring_nodes(ring) for ring, _ in route.holes]),
                 weights=np.array([point_weights(angle) for _, angle in route.holes]),

@@ -1,4 +1,4 @@
-"""The identification problem (10): measured points, the model's prediction of them, and their difference.
+"""The regression (10) of an identification: measured points, the model's prediction of them, and their difference.
 
 A *group* is one static configuration or one log; errors are told per group and groups are held out. A single
 log is divided into four groups of equal length instead.
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.identify.frame import Frame
+from tcrctl.identify.coordinate_frame import CoordinateFrame
 from tcrctl.identify.log_data import Recording
 from tcrctl.identify.motion import marker_motion
 from tcrctl.identify.parameters import Parameter, values, with_values
@@ -25,14 +25,14 @@ from tcrctl.robot.robot import build_robot
 from tcrctl.signals import Array
 
 MM = 1e3
-#: Step of finite differences in the unit cube, for logs.
-UNIT_STEP = 2e-3
+#: Deviation of finite differences in the unit cube, for logs.
+UNIT_DEVIATION = 2e-3
 _QUARTERS = 4
 
 
 @dataclass(frozen=True)
-class Problem:
-    """Everything that a prediction needs; plain data, so that it can go to another process.
+class Regression:
+    """Unknowns, data and what else a prediction needs; plain data, so that it can go to another process.
 
     Attributes:
         robot: The robot to start from.
@@ -40,7 +40,7 @@ class Problem:
         configurations: Static data.
         recordings: Logs.
         reference: Configuration that displacements are taken from; empty for positions.
-        step: Internal time step of logs [s].
+        h: Internal step of simulated logs [s].
     """
 
     robot: RobotDescription
@@ -48,7 +48,7 @@ class Problem:
     configurations: tuple[Configuration, ...]
     recordings: tuple[Recording, ...]
     reference: str
-    step: float
+    h: float
 
     @cached_property
     def measured(self) -> Array:
@@ -88,7 +88,7 @@ class Problem:
         return np.array(kept), np.array([row[self.reference, names[i][1]] for i in kept])
 
     def relative(self, points: Array) -> Array:
-        """Displacements from the reference configuration, of points (n, 3, ...); all of them without one."""
+        """Return displacements from the reference configuration, of points (n, 3, ...); all of them without one."""
         if not self.reference:
             return points
         kept, reference = self._reference_rows
@@ -96,11 +96,11 @@ class Problem:
         return out
 
     def describe(self, x: Array) -> RobotDescription:
-        """The robot at ``x`` (n_parameters,) of the unit cube."""
+        """Return the robot at ``x`` (n_parameters,) of the unit cube."""
         return with_values(self.robot, values(self.parameters, x))
 
     def predict(self, x: Array) -> Array:
-        """Model positions or displacements of all compared points (n, 3) [m], robot frame.
+        """Return the model positions or displacements of all compared points (n, 3) [m], robot frame.
 
         Raises:
             NoEquilibriumError: If the robot has no stable shape.
@@ -110,11 +110,11 @@ class Problem:
         parts = []
         for c, q in zip(self.configurations, rest_shapes(robot, self._drives), strict=True):
             parts.append(q.reshape(-1, 3)[np.array(c.rows)].mean(axis=1))
-        parts += [marker_motion(robot, recording, self.step).reshape(-1, 3) for recording in self.recordings]
+        parts += [marker_motion(robot, recording, self.h).reshape(-1, 3) for recording in self.recordings]
         return self.relative(np.concatenate(parts))
 
     def static_slopes(self, x: Array) -> Array:
-        """∂(prediction)/∂x (n, 3, n_parameters) for static data alone, through the tangent.
+        """Return ∂(prediction)/∂x (n, 3, n_parameters) for static data alone, through the tangent.
 
         Raises:
             NoEquilibriumError: As :meth:`predict`.
@@ -132,37 +132,37 @@ class Problem:
         return self.relative(np.concatenate(parts))
 
     def difference_points(self, x: Array) -> list[tuple[Array, float]]:
-        """Points beside ``x`` in the unit cube and signed steps, one per parameter, for finite differences."""
+        """Return points beside ``x`` in the unit cube and signed deviations, one per parameter, for differences."""
         points = []
         for j in range(len(x)):
-            step = UNIT_STEP if x[j] + UNIT_STEP <= 1.0 else -UNIT_STEP
+            deviation = UNIT_DEVIATION if x[j] + UNIT_DEVIATION <= 1.0 else -UNIT_DEVIATION
             beside = x.copy()
-            beside[j] += step
-            points.append((beside, step))
+            beside[j] += deviation
+            points.append((beside, deviation))
         return points
 
     @cached_property
     def _drives(self) -> Array:
         return np.array([c.drive for c in self.configurations]).reshape(-1, len(self.robot.cables.routes))
 
-    def with_parameters(self, parameters: Sequence[Parameter]) -> Problem:
-        """The same data with other parameters."""
+    def with_parameters(self, parameters: Sequence[Parameter]) -> Regression:
+        """Return the same data with other parameters."""
         return replace(self, parameters=tuple(parameters))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what is derived."""
+        """Leave out what is derived."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def distances(frame: Frame, predicted: Array, measured: Array) -> Array:
-    """Distance between prediction and measurement (n,) [mm] over the measured coordinates of each point."""
+def distances(frame: CoordinateFrame, predicted: Array, measured: Array) -> Array:
+    """Return distance between prediction and measurement (n,) [mm] over the measured coordinates of each point."""
     difference = MM * (frame.place(predicted) - measured)
     out: Array = np.sqrt(np.nansum(difference**2, axis=1))
     return out
 
 
-def mean_distance(frame: Frame, predicted: Array, measured: Array) -> float:
-    """The objective (10) [mm], frame unknowns at their best."""
+def mean_distance(frame: CoordinateFrame, predicted: Array, measured: Array) -> float:
+    """Return the objective (10) [mm], frame unknowns at their best."""
     seen = ~np.isnan(measured).all(axis=1)
     found = frame.aligned(predicted, measured)
     return float(distances(found, predicted, measured)[seen].mean())

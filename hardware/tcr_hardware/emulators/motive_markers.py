@@ -18,8 +18,8 @@ FIRST_POINT_CLOUD_ID = 50001
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
-    """A rigid body of the scene: its number, its name, the names of its markers and their rows."""
+class TrackedBody:
+    """A tracked rigid body: its number, its name, the names of its markers and their rows."""
 
     id: int
     name: str
@@ -52,7 +52,7 @@ class View:
     params: NDArray[np.int64]
 
 
-class Scene:
+class TrackedMarkers:
     """Markers with names ``body.marker``; a name without a dot belongs to the body ``markers``.
 
     Attributes:
@@ -69,7 +69,7 @@ class Scene:
         for row, name in enumerate(self.names):
             rows.setdefault(name.rpartition(".")[0] or "markers", []).append(row)
         self.bodies = tuple(
-            Body(k + 1, body, tuple(self.names[row].rpartition(".")[2] for row in of), np.array(of))
+            TrackedBody(k + 1, body, tuple(self.names[row].rpartition(".")[2] for row in of), np.array(of))
             for k, (body, of) in enumerate(rows.items())
         )
         self._row = {name: row for row, name in enumerate(self.names)}
@@ -115,16 +115,17 @@ class Scene:
         return mask
 
     def _unlabelled(self, points: NDArray[np.float64]) -> View:
-        """Nothing is recognised: points in an order of their own."""
+        """Recognise nothing: return points in an order of their own."""
         n, b = len(points), len(self.bodies)
-        ids, upright = FIRST_POINT_CLOUD_ID + np.arange(n), np.tile([0.0, 0.0, 0.0, 1.0], (b, 1))
+        ids = FIRST_POINT_CLOUD_ID + np.arange(n)
+        upright = np.tile([0.0, 0.0, 0.0, 1.0], (b, 1))
         nothing = np.zeros((len(self.names), 3))
         return View(
             nothing, points, np.zeros((b, 3)), upright, np.zeros(b, bool), ids, points, np.full(n, UNLABELLED)
         )
 
     def _orientations(self, seen: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rotation of every body against its definition, from its first three markers."""
+        """Return the rotation of every body against its definition, from its first three markers."""
         out = np.tile([0.0, 0.0, 0.0, 1.0], (len(self.bodies), 1))
         turned = _triads(seen[self._corners]) @ self._axes.transpose(0, 2, 1)
         known = np.isfinite(turned).all(axis=(1, 2))
@@ -134,7 +135,7 @@ class Scene:
 
 
 def _triads(corners: NDArray[Any]) -> NDArray[np.float64]:
-    """Orthonormal axes (b, 3, 3), as columns, fixed to triples of markers (b, 3, 3); NaN if they are on a line."""
+    """Return orthonormal axes (b, 3, 3) as columns, fixed to triples of markers (b, 3, 3); NaN if on a line."""
     x, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     z = _cross(x, across)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -144,6 +145,6 @@ def _triads(corners: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
-    """Row-wise cross product; for a few rows ten times as fast as ``np.cross``."""
+    """Return row-wise cross products; for a few rows ten times as fast as ``np.cross``."""
     (ax, ay, az), (bx, by, bz) = a.T, b.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
