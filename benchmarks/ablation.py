@@ -10,11 +10,20 @@ from __future__ import annotations
 
 import argparse
 import os
-from concurrent.futures import ProcessPoolExecutor
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
+os.environ.setdefault("NUMBA_OPT", "1")
 
 from rich.console import Console
 from rich.table import Table
-from simulate import Outcome, simulate
+
+from tcrctl.errors import TcrctlError
+from tcrctl.executors.engine import Engine, physical_cores
+from tcrctl.executors.outcomes import Crash, outcomes
+from tcrctl.experiment.prepare import prepare
+from tcrctl.experiment.spec import load_spec
+from tcrctl.experiment.summary import Summary
+from tcrctl.experiment.unrecorded import run_unrecorded
 
 STIFF = tuple(
     f"plant.mismatch.{name}={factor}"
@@ -47,29 +56,37 @@ CHANGES: dict[str, tuple[str, ...]] = {
 }
 
 
-def cell(outcome: Outcome) -> str:
+def simulate(order: tuple[str, str]) -> Summary | str:
+    """Run one change on one plant; why not, if it cannot be run."""
+    change, plant = order
+    spec, settings = PLANTS[plant]
+    try:
+        loaded = load_spec(spec, (*settings, *(f"controller.{text}" for text in CHANGES[change])))
+        return run_unrecorded(prepare(loaded))
+    except TcrctlError as error:
+        return str(error)
+
+
+def cell(outcome: Summary | str | Crash) -> str:
     """Return the largest and rms error, largest angle; or when it was stopped."""
-    if outcome.failure:
-        return f"diverges after {outcome.measures.duration_s:.0f} s"
-    text = f"{outcome.part('position_error_mm'):.2f} / {outcome.part('position_error_mm', 'rms'):.2f} mm"
-    angle = outcome.part("orientation_error_deg")
-    return text if angle != angle else f"{text}, {angle:.2f}°"
+    if not isinstance(outcome, Summary):
+        return str(outcome)
+    found = outcome.measures
+    if outcome.status not in ("success", "failed") or found.position_error_mm is None:
+        return f"diverges after {found.duration_s:.0f} s"
+    text = f"{found.position_error_mm['max']:.2f} / {found.position_error_mm['rms']:.2f} mm"
+    angle = found.orientation_error_deg
+    return text if angle is None else f"{text}, {angle['max']:.2f}°"
 
 
 def main() -> None:
     """Print the table, as Markdown where the output is no terminal."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
-    jobs = parser.parse_args().jobs
-    with ProcessPoolExecutor(jobs) as pool:
-        runs = {
-            name: [
-                pool.submit(simulate, spec, (*plant, *(f"controller.{change}" for change in changes)))
-                for spec, plant in PLANTS.values()
-            ]
-            for name, changes in CHANGES.items()
-        }
-        rows = [(name, *(cell(run.result()) for run in row)) for name, row in runs.items()]
+    parser.add_argument("--jobs", type=int, default=physical_cores(), help="processes")
+    engine = Engine(parser.parse_args().jobs)
+    orders = [(change, plant) for change in CHANGES for plant in PLANTS]
+    found = dict(outcomes(engine, simulate, orders))
+    rows = [(change, *(cell(found[change, plant]) for plant in PLANTS)) for change in CHANGES]
     console, header = Console(), ("setting", *PLANTS)
     if console.is_terminal:
         table = Table(*header)

@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 #: What no two runs have in common.
-OF_ONE_RUN = ("run_id", "log", "control_ms", "overruns")
+OF_ONE_RUN = ("run_id", "log", "control_ms", "overruns", "versions")
 
 
 def numbers(found: Any, path: str = "") -> Iterator[tuple[str, str]]:

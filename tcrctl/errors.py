@@ -164,6 +164,18 @@ class SafetyLimitError(StoppedError):
         self.unit = unit
 
 
+class TimeLimitError(StoppedError):
+    """A run took longer than it may.
+
+    Attributes:
+        limit_s: What it may take [s].
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        super().__init__(f"took longer than {limit_s:g} s")
+        self.limit_s = limit_s
+
+
 class DivergenceError(StoppedError):
     """The simulated plant could not complete an internal step.
 

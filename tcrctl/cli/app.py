@@ -28,14 +28,22 @@ from tcrctl.cli.replay import replay
 from tcrctl.cli.report import report
 from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.cli.run import run
+from tcrctl.cli.runs import runs
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
 from tcrctl.cli.stability import stability
+from tcrctl.cli.sweep import sweep
+from tcrctl.cli.tune import tune
 from tcrctl.cli.validate import validate
+from tcrctl.cli.workspace import workspace
 from tcrctl.errors import DeviceError, SpecError, TcrctlError
 
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,
+    "sweep": sweep,
+    "tune": tune,
+    "runs": runs,
+    "workspace": workspace,
     "identify": identify,
     "list": list_shipped,
     "show": show,

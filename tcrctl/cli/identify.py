@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson, Overrides, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Overrides, SideBySide, unfolded
 
 if TYPE_CHECKING:
     from tcrctl.identify.loading import LoadedIdentification
@@ -49,11 +49,7 @@ StrungBy = Annotated[
 Seed = Annotated[
     int | None, typer.Option("--seed", metavar="N", min=0, max=2**32 - 1, help="Seed of the swarm.")
 ]
-Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", "-j", min=1, metavar="N", help="Worker processes; default: one per core."),
-]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the folder of results is made.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where its folder is made.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
@@ -109,7 +105,7 @@ def identify(
     told: Told = Told(),
     instead: Instead = Instead(),
     changed: Changed = Changed(),
-    jobs: Jobs = None,
+    side: SideBySide = SideBySide(),
     overrides: Overrides = None,
     out: Out = Path("logs"),
     shown: Shown = Shown(),
@@ -142,7 +138,7 @@ def identify(
         say(_headline(loaded))
         from tcrctl.identify.identification import identify as find
     with _progress_line(shown=not shown.quiet) as progress:
-        result = find(loaded, jobs=jobs, notify=say, progress=progress)
+        result = find(loaded, engine=side.engine, notify=say, progress=progress)
     files = _write(loaded, result, out)
     for warning in result.warnings:
         print(f"warning: {warning}", file=sys.stderr)

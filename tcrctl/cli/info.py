@@ -5,27 +5,30 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from tcrctl.cli.log_file import LogFile
+from tcrctl.cli.log_file import LogFiles
 from tcrctl.cli.options import AsJson
 
 if TYPE_CHECKING:
     from tcrctl.analysis.info import LogInfo, Spread
 
 
-def info(log: LogFile, as_json: AsJson = False) -> None:
-    """Show duration, timing, lost steps, outcome and provenance of a log, finished or not.
+def info(logs: LogFiles, as_json: AsJson = False) -> None:
+    """Show duration, timing, lost steps, outcome and provenance of logs, finished or not.
+
+    With --json, one object per log, each on its line.
 
     Examples:
-      tcrctl info logs/latest/log.mcap
+      tcrctl info logs/latest
       tcrctl info log.mcap --json | jq .control_ms.p99
     """
     from tcrctl.analysis.info import inspect
 
-    found = inspect(log)
-    if as_json:
-        print(json.dumps(found.as_json()))
-    else:
-        _print_tables(found)
+    for log in logs:
+        found = inspect(log)
+        if as_json:
+            print(json.dumps(found.as_json()))
+        else:
+            _print_tables(found)
 
 
 def _print_tables(found: LogInfo) -> None:

@@ -11,7 +11,7 @@ from tcrctl.cli.options import AsJson
 
 
 def list_shipped(as_json: AsJson = False) -> None:
-    """List the shipped experiments, identifications, robots and rigs.
+    """List the shipped experiments, identifications, studies, robots and rigs.
 
     Examples:
       tcrctl list
@@ -26,26 +26,30 @@ def list_shipped(as_json: AsJson = False) -> None:
         _entry(name, path, ("description", "robot", "source"))
         for name, path in shipped.identifications().items()
     ]
+    studies = [_entry(name, path, ("description",)) for name, path in shipped.studies().items()]
     robots = [_entry(name, path, ("description",)) for name, path in shipped.robots().items()]
     rigs = [_entry(name, path, ("description",)) for name, path in shipped.rigs().items()]
     if as_json:
         found = {
             "experiments": experiments,
             "identifications": identifications,
+            "studies": studies,
             "robots": robots,
             "rigs": rigs,
         }
         print(json.dumps(found))
         return
-    _print_table(("EXPERIMENT", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), experiments)
+    print_columns(("EXPERIMENT", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), experiments)
     print()
-    _print_table(
+    print_columns(
         ("IDENTIFICATION", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), identifications
     )
     print()
-    _print_table(("ROBOT", "DESCRIPTION"), ("name", "description"), robots)
+    print_columns(("STUDY", "DESCRIPTION"), ("name", "description"), studies)
     print()
-    _print_table(("RIG", "DESCRIPTION"), ("name", "description"), rigs)
+    print_columns(("ROBOT", "DESCRIPTION"), ("name", "description"), robots)
+    print()
+    print_columns(("RIG", "DESCRIPTION"), ("name", "description"), rigs)
 
 
 def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:
@@ -61,7 +65,14 @@ def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:
     return {"name": name, **{key: str(values.get(key) or "") for key in keys}, "path": str(path)}
 
 
-def _print_table(titles: Sequence[str], keys: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+def print_columns(titles: Sequence[str], keys: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+    """Print rows in columns as wide as they need.
+
+    Args:
+        titles: Of the columns.
+        keys: Of their values in the rows.
+        rows: Text by key.
+    """
     cells = [list(titles), *([row[key] for key in keys] for row in rows)]
     widths = [max(len(row[i]) for row in cells) for i in range(len(keys))]
     for row in cells:

@@ -15,6 +15,10 @@ def log_path(text: str) -> Path:
     return log_in(Path(text))
 
 
+LogFiles: TypeAlias = Annotated[
+    list[Path],
+    typer.Argument(metavar="LOG...", help="Logs of runs, MCAP files, or the runs' folders.", parser=log_path),
+]
 LogFile: TypeAlias = Annotated[
     Path,
     typer.Argument(metavar="LOG", help="Log of a run, an MCAP file, or the run's folder.", parser=log_path),

@@ -5,10 +5,16 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
-from dataclasses import MISSING, fields, is_dataclass
-from typing import Annotated, Any, TypeAlias, get_type_hints
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_type_hints
 
 import typer
+
+if TYPE_CHECKING:
+    from tcrctl.executors.engine import Engine
+
+#: Variable of the environment that says where runs go.
+LOGS = "TCRCTL_LOGS"
 
 Spec: TypeAlias = Annotated[
     str, typer.Argument(metavar="SPEC", help="Shipped experiment, or path of a YAML file.")
@@ -21,6 +27,33 @@ Overrides: TypeAlias = Annotated[
 ]
 AsJson: TypeAlias = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 IsRobot: TypeAlias = Annotated[bool, typer.Option("--robot", help="Robot files instead of experiments.")]
+
+
+@dataclass(frozen=True)
+class SideBySide:
+    """How work is done side by side."""
+
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs", "-j", metavar="N", min=1, help="Processes side by side; default: physical cores."
+        ),
+    ] = None
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            "--dask",
+            metavar="ADDRESS",
+            help="A Dask scheduler instead, or: local. Needs 'tcrctl\\[cluster]'.",
+        ),
+    ] = None
+
+    @property
+    def engine(self) -> Engine:
+        """Where work is done."""
+        from tcrctl.executors.engine import Engine, physical_cores
+
+        return Engine(self.jobs or physical_cores(), self.dask)
 
 
 def unfolded(verb: Callable[..., None]) -> Callable[..., None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,25 +11,35 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import LOGS, AsJson, SideBySide, unfolded
 
 if TYPE_CHECKING:
-    from tcrctl.paper.job import Job
+    from tcrctl.paper.job import Done, Job
     from tcrctl.paper.paper import Report
-    from tcrctl.paper.processes import Done
+    from tcrctl.study.plan import PlannedRun
+    from tcrctl.study.row import Row
 
     Told = tuple[Callable[[Job], None], Callable[[Done], None]]
 
 Out = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Where the report's folder is made.", show_default=True)
+    Path,
+    typer.Option(
+        "--out", metavar="DIR", envvar=LOGS, help="Where the report's folder is made.", show_default=True
+    ),
 ]
 Only = Annotated[
     list[str] | None,
     typer.Option("--only", metavar="ROW", help="Only this row of the table; repeatable. See --rows."),
 ]
-Workers = Annotated[
-    int | None,
-    typer.Option("--jobs", "-j", metavar="N", min=1, help="Processes side by side.  [default: cores]"),
+Seeds = Annotated[
+    int,
+    typer.Option(
+        "--seeds",
+        metavar="N",
+        min=0,
+        max=10000,
+        help="Rows on N plants as real as a laboratory's too: median, interval, worst. Minutes per plant.",
+    ),
 ]
 Names = Annotated[bool, typer.Option("--rows", help="Print the names of the rows and run nothing.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
@@ -38,10 +47,12 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no m
 _STYLES = {"goal": "green", "met": "green", "missed": "red", "failed": "red", "not run": "yellow"}
 
 
+@unfolded
 def paper(
     out: Out = Path("logs"),
     only: Only = None,
-    jobs: Workers = None,
+    side: SideBySide = SideBySide(),
+    seeds: Seeds = 0,
     rows: Names = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -50,10 +61,11 @@ def paper(
 
     Runs whose computing time counts have the machine for themselves; the others run side by side. The report
     goes to a new folder DIR/TIME_paper_ID with paper.md, paper.json and all runs. Exit code 3: a bar was missed.
-    Ctrl-C stops all runs and keeps what is done.
+    Ctrl-C stops all runs and keeps what is done. --seeds runs the study realistic, which resumes where it ended.
 
     Examples:
       tcrctl paper
+      tcrctl paper --seeds 20
       tcrctl paper --only letters --only table2
       tcrctl paper --json --jobs 4 | jq '.rows[] | {name, measured, verdict}'
     """
@@ -65,9 +77,11 @@ def paper(
         print(json.dumps([row.name for row in chosen]) if as_json else "\n".join(row.name for row in chosen))
         return
     check_writable(out)
-    workers = jobs or _cores()
     with _progress(len(jobs_of(chosen)), quiet=quiet) as (begun, ended):
-        report = run_paper(chosen, out=out, workers=workers, begun=begun, ended=ended)
+        told = (lambda run, row: None) if quiet else _say_run
+        report = run_paper(
+            chosen, out=out, engine=side.engine, seeds=seeds, begun=begun, ended=ended, seed_ended=told
+        )
     if report.reason:
         print(f"error: {report.reason}", file=sys.stderr)
     if as_json:
@@ -76,11 +90,6 @@ def paper(
         _print_table(report)
     if report.exit_code:
         raise typer.Exit(report.exit_code)
-
-
-def _cores() -> int:
-    """Return the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
@@ -126,18 +135,23 @@ def _said(done: Done) -> str:
     return f"{done.job.label}: {done.reason or 'done'}, {done.seconds:.0f} s"
 
 
+def _say_run(run: PlannedRun, row: Row) -> None:
+    experiment = run.levels["experiment"]
+    print(f"plant {run.seed}, {experiment}: {row.reason or row.status}, {row.seconds:.0f} s", file=sys.stderr)
+
+
 def _print_table(report: Report) -> None:
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
-    from tcrctl.paper.report import TITLES
+    from tcrctl.paper.report import cells, titles
 
     console, table = Console(), Table(box=None)
-    for title in TITLES:
+    for title in titles(report.lines):
         table.add_column(title, overflow="fold")
-    for line in report.lines:
-        table.add_row(*(escape(cell) for cell in line.cells()), style=_STYLES.get(line.verdict, ""))
+    for line, texts in zip(report.lines, cells(report.lines), strict=True):
+        table.add_row(*map(escape, texts), style=_STYLES.get(line.verdict, ""))
     console.print(table)
     console.print(" ".join(report.notes()), markup=False, highlight=False)
     print(f"report: {report.folder}")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson, Overrides, Spec, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Overrides, Spec, unfolded
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -25,7 +25,10 @@ if TYPE_CHECKING:
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Check everything, move nothing, write nothing.")]
 RealTime = Annotated[bool, typer.Option("--realtime", help="Pace a simulated plant by the clock.")]
 Out = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Where the run's folder is made.", show_default=True)
+    Path,
+    typer.Option(
+        "--out", metavar="DIR", envvar=LOGS, help="Where the run's folder is made.", show_default=True
+    ),
 ]
 Seed = Annotated[
     int | None, typer.Option("--seed", metavar="N", min=0, max=2**63 - 1, help="Seed of everything random.")
@@ -77,8 +80,11 @@ def run(
     The result goes to a new folder DIR/TIME_NAME_ID with log.mcap, spec.yaml, spec.resolved.yaml and
     summary.json. Ctrl-C or SIGTERM stop a run safely between two steps; a second Ctrl-C stops it at once.
 
+    DIR/latest leads to the last run. The folder of a run, in place of SPEC, does it again bit for bit.
+
     Examples:
       tcrctl run letter_t
+      tcrctl run logs/latest --set controller.prediction.horizon_s=0.6
       tcrctl run letter_t --set plant.mismatch=off --seed 7
       tcrctl run my_experiment.yaml --dry-run
       tcrctl run letter_t --realtime --view
@@ -86,14 +92,15 @@ def run(
       tcrctl run letter_t --set plant.kind=rig --set plant.rig=loopback   (see: tcrctl emulate --help)
     """
     from tcrctl.cli.consent import ask, check_can_ask
-    from tcrctl.experiment.spec import load_spec
+    from tcrctl.experiment.again import load_experiment
+    from tcrctl.experiment.run_folder import link_latest
     from tcrctl.loop.interruption import signals_exit
 
     say: Notify = _nothing if quiet else _say
     dry_run, shown = manner.dry_run, viewing.view and not manner.dry_run
     with ExitStack() as stack:
         with signals_exit():
-            loaded = load_spec(spec, overrides or ())
+            loaded = load_experiment(spec, overrides or ())
             for note in loaded.notes:
                 say(f"note: {note}")
             say(_headline(loaded))
@@ -112,6 +119,8 @@ def run(
         if loaded.rig is not None and not yes:
             ask(f"{loaded.robot.name} on rig {loaded.rig.rig.name} will move for {_length(experiment)}.")
         summary = _run(experiment, manner, say, tap, quiet=quiet)
+        if summary.log is not None:
+            link_latest(summary.log.parent)
     if summary.reason:
         print(f"{'error' if summary.exit_code != 3 else summary.status}: {summary.reason}", file=sys.stderr)
     if as_json:

@@ -1,4 +1,4 @@
-"""``tcrctl schema``: the JSON Schema of experiment, robot, rig or identification files."""
+"""``tcrctl schema``: the JSON Schema of experiment, robot, rig, identification or study files."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ def schema(
     identification: Annotated[
         bool, typer.Option("--identification", help="Identification files instead of experiments.")
     ] = False,
+    study: Annotated[bool, typer.Option("--study", help="Study files instead of experiments.")] = False,
 ) -> None:
     """Print the JSON Schema of experiment files, for completion and checks in an editor.
 
@@ -30,15 +31,17 @@ def schema(
     from tcrctl.identify.settings import IdentificationSpec
     from tcrctl.plant.rig.settings import RigFile
     from tcrctl.robot.description import RobotDescription
+    from tcrctl.study.settings import StudySpec
 
     kinds: list[tuple[bool, type[Settings]]] = [
         (robot, RobotDescription),
         (rig, RigFile),
         (identification, IdentificationSpec),
+        (study, StudySpec),
     ]
     wanted = [kind for given, kind in kinds if given]
     if len(wanted) > 1:
-        raise InputError("give --robot, --rig or --identification, not several of them")
+        raise InputError("give --robot, --rig, --identification or --study, not several of them")
     model = wanted[0] if wanted else ExperimentSpec
     made = {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema()}
     print(json.dumps(made, indent=2))

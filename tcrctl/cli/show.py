@@ -1,4 +1,4 @@
-"""``tcrctl show SPEC``: an experiment, identification or robot with every default filled in."""
+"""``tcrctl show SPEC``: an experiment, identification, study or robot with every default filled in."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_jso
 
 def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
     from tcrctl.config import shipped
-    from tcrctl.experiment.spec import load_spec, with_draws
+    from tcrctl.experiment.again import load_experiment
+    from tcrctl.experiment.spec import with_draws
     from tcrctl.robot.description import load_robot
 
     if robot:
@@ -39,5 +40,9 @@ def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:
         from tcrctl.identify.loading import load_identification
 
         return load_identification(name, overrides).spec
-    loaded = load_spec(name, overrides)
+    if shipped.is_study(name):
+        from tcrctl.study.command_line import told_study
+
+        return told_study(name, overrides).spec
+    loaded = load_experiment(name, overrides)
     return with_draws(loaded.spec, len(loaded.robot.cables.routes))

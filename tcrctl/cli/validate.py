@@ -17,7 +17,7 @@ def validate(
     robot: IsRobot = False,
     as_json: AsJson = False,
 ) -> None:
-    """Check experiment and identification files without running them; exit code 2 if there is a problem.
+    """Check experiment, identification and study files without running them; exit code 2 if there is a problem.
 
     Examples:
       tcrctl validate my_experiment.yaml
@@ -49,7 +49,7 @@ def validate(
 def _load(name: str, overrides: Sequence[str], *, robot: bool) -> None:
     """Read a file of any kind with all its checks."""
     from tcrctl.config import shipped
-    from tcrctl.experiment.spec import load_spec
+    from tcrctl.experiment.again import load_experiment
     from tcrctl.robot.description import load_robot
 
     if robot:
@@ -58,5 +58,10 @@ def _load(name: str, overrides: Sequence[str], *, robot: bool) -> None:
         from tcrctl.identify.loading import load_identification
 
         load_identification(name, overrides)
+    elif shipped.is_study(name):
+        from tcrctl.study.command_line import told_study
+        from tcrctl.study.plan import planned
+
+        planned(told_study(name, overrides))
     else:
-        load_spec(name, overrides)
+        load_experiment(name, overrides)

@@ -1,8 +1,8 @@
-"""Experiments, identifications, robots and rigs that come with the program, by name.
+"""Experiments, identifications, studies, robots and rigs that come with the program, by name.
 
 Robots lie in the package. Experiments and rigs lie in ``experiments/`` and ``hardware/rigs/`` beside it in a
 checkout, and inside it in an installed wheel. The names of identifications, which lie with the experiments,
-begin with ``identify_``.
+begin with ``identify_``; studies lie in ``studies/`` below them.
 """
 
 from __future__ import annotations
@@ -26,9 +26,18 @@ def identifications() -> dict[str, Path]:
     return {name: path for name, path in _experiment_files().items() if name.startswith(_IDENTIFY)}
 
 
+def studies() -> dict[str, Path]:
+    """Return the files of the shipped studies by name, sorted."""
+    return _by_name(_experiment_folder() / "studies")
+
+
 def _experiment_files() -> dict[str, Path]:
+    return _by_name(_experiment_folder())
+
+
+def _experiment_folder() -> Path:
     inside = _PACKAGE / "experiments"
-    return _by_name(inside if inside.is_dir() else _PACKAGE.parent / "experiments")
+    return inside if inside.is_dir() else _PACKAGE.parent / "experiments"
 
 
 def robots() -> dict[str, Path]:
@@ -57,6 +66,11 @@ def find_experiment(name_or_path: str) -> Path:
             f"{name_or_path} is an identification, not an experiment",
             hint=f"Start it with: tcrctl identify {name_or_path}",
         )
+    if is_study(name_or_path):
+        raise InputError(
+            f"{name_or_path} is a study, not an experiment",
+            hint=f"Start it with: tcrctl sweep {name_or_path}",
+        )
     return _find("experiment", name_or_path, experiments(), Path())
 
 
@@ -71,6 +85,19 @@ def find_identification(name_or_path: str) -> Path:
         InputError: If the path leads to no file.
     """
     return _find("identification", name_or_path, identifications(), Path())
+
+
+def find_study(name_or_path: str) -> Path:
+    """Return the file of a study.
+
+    Args:
+        name_or_path: Shipped name, or path of a YAML file.
+
+    Raises:
+        UnknownNameError: If there is no shipped study of that name.
+        InputError: If the path leads to no file.
+    """
+    return _find("study", name_or_path, studies(), Path())
 
 
 def find_robot(name_or_path: str, folder: Path | None = None) -> Path:
@@ -105,15 +132,26 @@ def find_rig(name_or_path: str, folder: Path | None = None) -> Path:
 
 def is_identification(name_or_path: str) -> bool:
     """Tell whether a shipped name or a file is an identification; False if there is none or it cannot be read."""
+    return _is_kind("identification", name_or_path, identifications())
+
+
+def is_study(name_or_path: str) -> bool:
+    """Tell whether a shipped name or a file is a study; an experiment of the same name comes first."""
+    if name_or_path in experiments():
+        return False
+    return _is_kind("study", name_or_path, studies())
+
+
+def _is_kind(kind: str, name_or_path: str, shipped: Mapping[str, Path]) -> bool:
     from tcrctl.config import strict_yaml
 
     if not is_path(name_or_path):
-        return name_or_path in identifications()
+        return name_or_path in shipped
     try:
         data = strict_yaml.load(Path(name_or_path).expanduser()).data
     except InputError:
         return False
-    return isinstance(data, dict) and data.get("kind") == "identification"
+    return isinstance(data, dict) and data.get("kind") == kind
 
 
 def is_path(name_or_path: str) -> bool:

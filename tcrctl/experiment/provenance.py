@@ -11,6 +11,7 @@ import platform
 import socket
 import sys
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -20,7 +21,7 @@ from tcrctl import __version__
 from tcrctl.config import strict_yaml
 from tcrctl.experiment.plant_robot import description_of_plant
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
-from tcrctl.log.file_names import CAMERAS, PLANT_ROBOT, RESOLVED, RIG, ROBOT, SPEC, VERSIONS
+from tcrctl.log.file_names import CAMERAS, DESIGNED, PLANT_ROBOT, RESOLVED, RIG, ROBOT, SPEC, VERSIONS
 from tcrctl.plant.cameras import draw_cameras
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.robot.module import ring_rows
@@ -41,6 +42,29 @@ _PACKAGES: Final = (
 def resolved_text(spec: ExperimentSpec) -> bytes:
     """Write an experiment as a file with every default filled in and ``--set`` applied."""
     return strict_yaml.dumps(spec.model_dump(mode="json")).encode()
+
+
+def own_files(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, bytes]:
+    """Files that a run's folder holds, so that it can be done again from there: :mod:`tcrctl.experiment.again`.
+
+    Args:
+        loaded: The experiment as it was given.
+        spec: As it runs.
+
+    Raises:
+        InputError: If the robot's file has gone.
+    """
+    files = {
+        SPEC: loaded.given_text,
+        RESOLVED: resolved_text(spec),
+        ROBOT: strict_yaml.read(loaded.robot_path),
+    }
+    if loaded.rig is not None:
+        files[RIG] = loaded.rig.given
+    named = isinstance(spec.plant, SimulatedSettings) and isinstance(spec.plant.robot, str)
+    if named and loaded.plant_robot is not None:
+        files[DESIGNED] = strict_yaml.dumps(loaded.plant_robot.model_dump(mode="json")).encode()
+    return files
 
 
 def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str, bytes]]:
@@ -116,6 +140,7 @@ def processor() -> str:
     return named or platform.processor() or platform.machine()
 
 
+@cache
 def source_digest() -> str:
     """Return the SHA-256 over the names and contents of all Python files of the package."""
     digest, package = hashlib.sha256(), Path(__file__).parents[1]

@@ -12,14 +12,15 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from tcrctl.errors import DeviceError, LogError, RunInterruptedError, StoppedError, TcrctlError
+from tcrctl.errors import DeviceError, LogError, StoppedError, TcrctlError
 from tcrctl.experiment.metrics import Metrics
+from tcrctl.experiment.outcome import summary_of
 from tcrctl.experiment.prepare import Experiment, Notify, build_parts, build_plant, make_task, silent
-from tcrctl.experiment.provenance import attachments, resolved_text, start_metadata
+from tcrctl.experiment.provenance import attachments, own_files, start_metadata, versions
 from tcrctl.experiment.run_folder import (
     LOG,
     SUMMARY,
@@ -27,8 +28,7 @@ from tcrctl.experiment.run_folder import (
     check_writable,
     make_run_folder,
 )
-from tcrctl.experiment.summary import Summary, Verdict, judge
-from tcrctl.log.file_names import RESOLVED, SPEC
+from tcrctl.experiment.summary import Summary
 from tcrctl.log.geometry import CableHoles, LogGeometry
 from tcrctl.log.mcap_file import Opening, Tap
 from tcrctl.log.writer import Flushing, LogWriter
@@ -49,10 +49,15 @@ PATH_SPACING_S: Final = 0.1
 MOST_PATH_POINTS: Final = 1000
 
 Progress = Callable[[int, int], None]
+Check = Callable[[], None]
 
 
 def _no_progress(done: int, total: int) -> None:
     """Show nothing."""
+
+
+def no_check() -> None:
+    """Find nothing."""
 
 
 def run_experiment(
@@ -64,6 +69,7 @@ def run_experiment(
     notify: Notify = silent,
     progress: Progress = _no_progress,
     tap: Tap | None = None,
+    check: Check = no_check,
 ) -> Summary:
     """Run an experiment and record it.
 
@@ -77,6 +83,7 @@ def run_experiment(
         notify: Takes messages for the user.
         progress: Takes the number of steps done and their total, after every step.
         tap: Takes every message of the log, in the log's thread; see :class:`tcrctl.view.live.LiveView`.
+        check: Called before every step; what it raises ends the run.
 
     Returns:
         The result; also of a run that was stopped by a limit, a signal or a device.
@@ -87,7 +94,12 @@ def run_experiment(
     check_writable(out)
     realtime = realtime or experiment.paced
     with Interruption() as interruption:
-        pace = RealTime(experiment.period, interruption.check) if realtime else Unpaced(interruption.check)
+
+        def checked() -> None:
+            interruption.check()
+            check()
+
+        pace = RealTime(experiment.period, checked) if realtime else Unpaced(checked)
         journal = Journal(pace.time, notify)
         plant, state = build_plant(experiment, Operation(pace.time, journal.report, confirmed))
         try:
@@ -112,8 +124,8 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap:
     """Write what is known before the first step; on failure the folder is as if it had never been."""
     spec, loaded = experiment.spec, experiment.loaded
     try:
-        folder.write(SPEC, loaded.given_text)
-        folder.write(RESOLVED, resolved_text(spec))
+        for name, content in own_files(loaded, spec).items():
+            folder.write(name, content)
         return LogWriter(
             folder.path / LOG,
             Opening(
@@ -172,7 +184,15 @@ def _recorded_run(
 
     with log:
         failure = _drive(experiment, replace(parts, record=record), plant, log)
-        summary = _summary(experiment, folder, metrics, {} if task is None else task.result(), failure)
+        summary = summary_of(
+            experiment,
+            folder.run_id,
+            metrics,
+            {} if task is None else task.result(),
+            failure,
+            folder.path / LOG,
+        )
+        summary = replace(summary, versions=versions())
         try:
             if failure is not None:
                 kind = "limit" if isinstance(failure, StoppedError) else "stop"
@@ -220,39 +240,3 @@ def _start_message(offset: float, approach: float) -> tuple[str, str]:
         )
     beside = f"the robot starts {1e3 * offset:.3f} mm beside the trajectory"
     return ("warning", f"{beside} and first goes there, {approach:.1f} s") if approach else ("info", beside)
-
-
-def _summary(
-    experiment: Experiment,
-    folder: RunFolder,
-    metrics: Metrics,
-    task: dict[str, Any],
-    failure: TcrctlError | None,
-) -> Summary:
-    spec = experiment.spec
-    summary = Summary(
-        run_id=folder.run_id,
-        spec=spec.name,
-        robot=experiment.robot.name,
-        plant=spec.plant.kind,
-        controller=spec.controller.kind,
-        status="success",
-        reason="",
-        exit_code=0,
-        measures=metrics.measures(),
-        criteria=(),
-        log=folder.path / LOG,
-        task=task,
-    )
-    verdicts = judge(spec.criteria, summary.as_json())
-    status, reason, exit_code = _outcome(failure, verdicts)
-    return replace(summary, criteria=verdicts, status=status, reason=reason, exit_code=exit_code)
-
-
-def _outcome(failure: TcrctlError | None, verdicts: tuple[Verdict, ...]) -> tuple[str, str, int]:
-    """Return the status, reason and exit code of a run."""
-    if failure is not None:
-        aborted = isinstance(failure, StoppedError | RunInterruptedError)
-        return "aborted" if aborted else "error", str(failure), failure.exit_code
-    missed = [str(verdict) for verdict in verdicts if not verdict.passed]
-    return ("failed", "; ".join(missed), 3) if missed else ("success", "", 0)

@@ -6,6 +6,7 @@ import datetime
 import os
 import secrets
 import shutil
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -14,6 +15,7 @@ from tcrctl.errors import DeviceError
 
 LOG: Final = "log.mcap"
 SUMMARY: Final = "summary.json"
+LATEST: Final = "latest"
 _TRIES: Final = 20
 
 
@@ -77,6 +79,17 @@ class RunFolder:
                 folder.rmdir()
             except OSError:  # something else has been put there meanwhile
                 return
+
+
+def link_latest(folder: Path) -> None:
+    """Let ``latest`` beside a run's folder lead to it, where links can be made and nothing else has that name."""
+    link = folder.with_name(LATEST)
+    beside = folder.with_name(f".{LATEST}.{os.getpid()}")
+    if link.exists() and not link.is_symlink():
+        return
+    with suppress(OSError):
+        beside.symlink_to(folder.name, target_is_directory=True)
+        os.replace(beside, link)
 
 
 def make_run_folder(out: Path, name: str) -> RunFolder:

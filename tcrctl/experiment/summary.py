@@ -123,12 +123,15 @@ class Summary:
         robot: Name of the robot.
         plant: Kind of the plant.
         controller: Kind of the controller.
+        seed: Seed of everything random.
+        overrides: What ``--set`` changed.
         status: ``success``; ``failed`` (a criterion); ``aborted`` (safety, divergence, signal); ``error``.
         reason: Why; empty for success.
         exit_code: What the program exits with.
         measures: What was measured.
         criteria: Every criterion with its verdict.
-        log: The log.
+        log: The log; None if there is none.
+        versions: Of everything that the numbers depend on; empty if nobody asked.
         task: What the task of the experiment asks for.
     """
 
@@ -137,26 +140,29 @@ class Summary:
     robot: str
     plant: str
     controller: str
+    seed: int
+    overrides: tuple[str, ...]
     status: str
     reason: str
     exit_code: int
     measures: Measures
     criteria: tuple[Verdict, ...]
-    log: Path
+    log: Path | None
     task: dict[str, Any] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """Return the object of ``run --json``; numbers that are not finite become null; on a rig with latency."""
         measures = dataclasses.asdict(self.measures)
         if self.measures.latency_ms is None:
             del measures["latency_ms"]
-        head = {
-            name: getattr(self, name) for name in ("run_id", "spec", "robot", "plant", "controller", "status")
-        }
+        named = ("run_id", "spec", "robot", "plant", "controller", "seed", "overrides", "status")
+        head = {name: getattr(self, name) for name in named}
         tail = {
             "criteria": [verdict.as_json() for verdict in self.criteria],
-            "log": str(self.log),
+            "log": None if self.log is None else str(self.log),
             "task": self.task,
+            "versions": self.versions,
         }
         made: dict[str, Any] = _finite({**head, "reason": self.reason, **measures, **tail})
         return made

@@ -1,44 +1,59 @@
-"""Evaluates the model, one process per core; counts, remembers the best, and ends when a signal has come."""
+"""Evaluates the model, side by side; counts, and ends when a signal has come."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 
-from tcrctl.errors import NoEquilibriumError
+from tcrctl.errors import DivergenceError, NoEquilibriumError, TcrctlError
+from tcrctl.executors.carried import Carried, carried
+from tcrctl.executors.engine import Engine
+from tcrctl.executors.workers import Workers
 from tcrctl.identify.regression import Regression
-from tcrctl.identify.workers import Workers, prediction
 from tcrctl.signals import Array
 
+#: How often a wait looks for signals [s].
+_LOOK_S: Final = 0.1
 
-def available_cores() -> int:
-    """Return the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+def prediction(regression: Regression, x: Array) -> Array | None:
+    """Return the prediction (n, 3) [m] at ``x`` of the unit cube, None if the robot has no shape there."""
+    try:
+        return regression.predict(x)
+    except (NoEquilibriumError, DivergenceError):
+        return None
+
+
+def _prediction_at(regression: Carried[Regression], x: Array) -> Array | None:
+    return prediction(regression.value, x)
 
 
 @dataclass
 class Evaluator:
-    """Runs predictions here or in worker processes, which are started when first needed.
+    """Runs predictions here or on an executor, whose workers are started when first needed.
 
     Attributes:
         regression: What is evaluated.
-        jobs: Worker processes; 1 works in this process.
+        engine: Where predictions are made; with one job in this process.
         check: Raises if a signal has come.
         progress: Told the number of evaluations so far.
         evaluations: Predictions of the whole data so far; sensitivities of statics count as one.
     """
 
     regression: Regression
-    jobs: int
+    engine: Engine
     check: Callable[[], None]
     progress: Callable[[int], None] = lambda evaluations: None
     evaluations: int = 0
+    _opened: ExitStack = field(default_factory=ExitStack, repr=False)
     _workers: Workers | None = field(default=None, repr=False)
+    _parcel: Carried[Regression] | None = field(default=None, repr=False)
 
     def predict(self, x: Array) -> Array | None:
         """Return the prediction (n, 3) [m] at ``x`` of the unit cube, None if the robot has no shape there."""
@@ -49,11 +64,28 @@ class Evaluator:
 
     def predict_many(self, points: Sequence[Array]) -> list[Array | None]:
         """Return the predictions at several points, side by side."""
-        if self.jobs == 1 or len(points) == 1:
+        if self.engine == Engine(jobs=1) or len(points) == 1:
             return [self.predict(x) for x in points]
-        if self._workers is None:
-            self._workers = Workers(self.regression, self.jobs)
-        return self._workers.predict(points, self._done)
+        if self._workers is None or self._parcel is None:
+            self._workers = self._opened.enter_context(self.engine.open())
+            self._parcel = carried(self.regression)
+        submit = self._workers.executor.submit
+        try:
+            asked = [submit(_prediction_at, self._parcel, x) for x in points]
+            self._wait(asked)
+            return [future.result() for future in asked]
+        except BrokenExecutor:
+            raise TcrctlError(
+                "a worker process ended by itself; perhaps there is not enough memory",
+                hint="Try fewer workers: --jobs 1.",
+            ) from None
+
+    def _wait(self, asked: Sequence[Future[Array | None]]) -> None:
+        left: set[Future[Array | None]] = set(asked)
+        while left:
+            done, left = wait(left, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
+            self.count(len(done))
+            self.check()
 
     def slopes(self, x: Array, predicted: Array) -> Array:
         """Return ∂(prediction)/∂x (n, 3, n_parameters): analytic for statics, differences for logs.
@@ -83,10 +115,6 @@ class Evaluator:
         self.evaluations += number
         self.progress(self.evaluations)
 
-    def _done(self, number: int) -> None:
-        self.count(number)
-        self.check()
-
     def __enter__(self) -> Self:
         """Return itself: nothing is started yet."""
         return self
@@ -94,6 +122,5 @@ class Evaluator:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the worker processes."""
-        if self._workers is not None:
-            self._workers.close()
+        """End the workers."""
+        self._opened.__exit__(kind, error, trace)

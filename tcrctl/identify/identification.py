@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.errors import RunInterruptedError
+from tcrctl.executors.engine import Engine, physical_cores
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.identify.best import Best
 from tcrctl.identify.building import assumed_forces, build_regression, choose_frame
 from tcrctl.identify.certainty import Certainty, certainty
 from tcrctl.identify.coordinate_frame import CoordinateFrame
-from tcrctl.identify.evaluation import Evaluator, available_cores
+from tcrctl.identify.evaluation import Evaluator
 from tcrctl.identify.held_out import held_out_errors
 from tcrctl.identify.loading import LoadedIdentification
 from tcrctl.identify.parameters import start_of, values, with_values
@@ -80,7 +81,7 @@ class Work:
 def identify(
     loaded: LoadedIdentification,
     *,
-    jobs: int | None = None,
+    engine: Engine | None = None,
     notify: Notify = silent,
     progress: Progress = no_progress,
 ) -> Result:
@@ -90,7 +91,7 @@ def identify(
 
     Args:
         loaded: What is to be done.
-        jobs: Worker processes; the cores of the machine if None.
+        engine: Where the model is evaluated; on the cores of this machine if None.
         notify: Takes messages for the user.
         progress: Takes what is being done, the number of evaluations and the best mean error [mm] so far.
 
@@ -105,7 +106,7 @@ def identify(
         frame, predicted, remark = choose_frame(loaded, regression)
     best = Best.none(start_of(regression.parameters), frame)
     interruption = Interruption()
-    evaluator = Evaluator(regression, jobs or available_cores(), interruption.check)
+    evaluator = Evaluator(regression, engine or Engine(physical_cores()), interruption.check)
     work = Work(loaded, regression, predicted, frame, evaluator, best)
     evaluator.progress = lambda count: progress(work.doing, count, _shown(work))
     held_out = np.full(len(regression.group_names), np.nan)
@@ -186,7 +187,9 @@ def _assumed(work: Work) -> tuple[str, Array] | None:
     ends = []
     for factor in (1.0 - FORCE_STEP, 1.0 + FORCE_STEP):
         changed = with_values(regression.robot, {path: factor * value for path, value in forces.items()})
-        predicted = Evaluator(replace(regression, robot=changed), 1, work.evaluator.check).predict(best.x)
+        predicted = Evaluator(
+            replace(regression, robot=changed), Engine(jobs=1), work.evaluator.check
+        ).predict(best.x)
         work.evaluator.count(1)
         if predicted is None:
             return None

@@ -1,4 +1,4 @@
 """``tcrctl paper``: the paper's experiments, run again and held against its figures.
 
-table (data) -> jobs, each a process of its own -> results -> verdicts -> Markdown, JSON
+table (data) -> jobs, in worker processes -> results -> verdicts -> Markdown, JSON
 """

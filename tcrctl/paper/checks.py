@@ -1,14 +1,7 @@
-"""Measurements that are no experiments: Table II by statics, the time of a plant step.
-
-    python -m tcrctl.paper.checks NAME
-
-prints one JSON object. A process of its own, because times shall not be disturbed.
-"""
+"""Measurements that are no experiments: Table II by statics, the time of a plant step."""
 
 from __future__ import annotations
 
-import json
-import sys
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
@@ -54,6 +47,3 @@ def plant_step() -> dict[str, Any]:
 
 
 CHECKS: Final[Mapping[str, Callable[[], dict[str, Any]]]] = {"table2": table2, "plant_step": plant_step}
-
-if __name__ == "__main__":
-    print(json.dumps(CHECKS[sys.argv[1]]()))

@@ -1,11 +1,18 @@
-"""What has to be run for a row of the table: an experiment or a check; each in a process of its own."""
+"""What has to be run for a row of the table: an experiment or a check; each in a worker process."""
 
 from __future__ import annotations
 
-import sys
+import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
+
+from tcrctl.errors import TcrctlError
+from tcrctl.experiment.prepare import plan, prepare
+from tcrctl.experiment.run import run_experiment
+from tcrctl.experiment.spec import load_spec
+from tcrctl.paper.checks import CHECKS
 
 #: Folder of the runs below that of the report.
 RUNS: Final = "runs"
@@ -24,13 +31,54 @@ class Job(Protocol):
         """Whether nothing else may run at the same time, since the time it takes is measured."""
         ...
 
-    def command(self, folder: Path) -> list[str]:
-        """Return arguments of the process; it prints one JSON object and exits with a code of :mod:`tcrctl.errors`.
+    def run(self, folder: Path) -> tuple[Mapping[str, Any], int]:
+        """Do it; returns an object of numbers and an exit code of :mod:`tcrctl.errors`.
 
         Args:
             folder: Where it may write.
+
+        Raises:
+            TcrctlError: If there is nothing to be measured.
         """
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What became of a job.
+
+    Attributes:
+        job: The job.
+        result: What it found; empty if nothing.
+        reason: Why there is nothing to be measured; empty if there is.
+        seconds: Wall time [s].
+        code: Exit code, as in :mod:`tcrctl.errors`.
+    """
+
+    job: Job
+    result: Mapping[str, Any]
+    reason: str
+    seconds: float
+    code: int = 0
+
+
+def do(order: tuple[Job, Path]) -> Done:
+    """Do a job in this process.
+
+    Args:
+        order: The job, and the folder where it may write.
+    """
+    job, folder = order
+    begin = time.monotonic()
+    try:
+        result, code = job.run(folder)
+    except TcrctlError as error:
+        result = {}
+        code = error.exit_code
+        reason = str(error)
+    else:  # a missed criterion is no failure
+        reason = "" if code in (0, 3) and result else str(result.get("reason") or f"exit code {code}")
+    return Done(job, result, reason, time.monotonic() - begin, code)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +100,12 @@ class Run:
         """What a person would type."""
         return " ".join((self.experiment, *(f"--set {text}" for text in self.overrides)))
 
-    def command(self, folder: Path) -> list[str]:
-        """Return the arguments of ``tcrctl run``."""
-        sets = [part for text in self.overrides for part in ("--set", text)]
-        program = [sys.executable, "-m", "tcrctl.cli.app", "run", self.experiment]
-        return [*program, "--json", "--quiet", "--out", str(folder / RUNS), *sets]
+    def run(self, folder: Path) -> tuple[Mapping[str, Any], int]:
+        """Do what ``tcrctl run --json`` does."""
+        experiment = prepare(load_spec(self.experiment, self.overrides))
+        plan(experiment)
+        summary = run_experiment(experiment, out=folder / RUNS)
+        return summary.as_json(), summary.exit_code
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +125,7 @@ class Check:
         """Name for messages."""
         return self.name.replace("_", " ")
 
-    def command(self, folder: Path) -> list[str]:
-        """Return the arguments of the check."""
+    def run(self, folder: Path) -> tuple[Mapping[str, Any], int]:
+        """Measure."""
         del folder
-        return [sys.executable, "-m", "tcrctl.paper.checks", self.name]
+        return CHECKS[self.name](), 0

@@ -5,24 +5,33 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from tcrctl.errors import RunInterruptedError, UnknownNameError
+from tcrctl.errors import DeviceError, RunInterruptedError, UnknownNameError
+from tcrctl.executors.engine import Engine
+from tcrctl.executors.outcomes import Crash, outcomes
 from tcrctl.experiment.provenance import versions
 from tcrctl.experiment.run_folder import RunFolder, make_run_folder
-from tcrctl.paper.job import Job
-from tcrctl.paper.processes import Done, Processes
+from tcrctl.loop.interruption import Interruption
+from tcrctl.paper.job import Done, Job, do
+from tcrctl.paper.over_seeds import over_seeds, run_seeds
 from tcrctl.paper.report import BAD, Line, make_line, markdown
 from tcrctl.paper.row import Row
 from tcrctl.paper.table import ROWS
+from tcrctl.study.plan import PlannedRun
+from tcrctl.study.row import Row as StudyRow
 
 MARKDOWN: Final = "paper.md"
 JSON: Final = "paper.json"
 #: Load per core from which on measured times are not to be trusted.
 BUSY: Final = 0.5
+#: No job of the table takes nearly as long [s].
+TIME_LIMIT_S: Final = 900.0
+#: Runs whose time counts have a worker process of this computer, and the machine, for themselves.
+ALONE: Final = Engine(jobs=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +45,8 @@ class Report:
         seconds: Wall time [s].
         load: Processes that wanted to run on this machine just before, mean of a minute; times suffer if there
             are nearly as many as cores.
-        interruption: The signal that ended it early, if one did.
+        interruption: What ended it early, if something did.
+        seeds: Plants as real as a laboratory's that it was run on too.
     """
 
     folder: Path
@@ -44,7 +54,8 @@ class Report:
     workers: int
     seconds: float
     load: float
-    interruption: RunInterruptedError | None
+    interruption: RunInterruptedError | DeviceError | None
+    seeds: int = 0
 
     @property
     def missed(self) -> list[str]:
@@ -76,12 +87,17 @@ class Report:
             f"{met} of {len(verdicts)} bars met{left}; {goals} goals met too."
             if verdicts
             else "No bars here.",
-            f"Made by `tcrctl paper` in {self.seconds:.0f} s with {self.workers} processes.",
+            f"Made by `{self.command}` in {self.seconds:.0f} s with {self.workers} processes.",
         ]
         if self.load > BUSY * self.cores:
             busy = f"load {self.load:.1f} on {self.cores} cores"
             notes.append(f"The machine was busy with other work before ({busy}): times are too long.")
         return notes
+
+    @property
+    def command(self) -> str:
+        """What a person would type."""
+        return f"tcrctl paper --seeds {self.seeds}" if self.seeds else "tcrctl paper"
 
     @property
     def cores(self) -> int:
@@ -127,18 +143,22 @@ def run_paper(
     rows: Sequence[Row],
     *,
     out: Path,
-    workers: int,
+    engine: Engine,
+    seeds: int = 0,
     begun: Callable[[Job], None],
     ended: Callable[[Done], None],
+    seed_ended: Callable[[PlannedRun, StudyRow], None] = lambda run, row: None,
 ) -> Report:
     """Run the jobs of some rows and write the report; also what there is of it when a signal stops it.
 
     Args:
         rows: What to measure.
         out: Where the report's folder is made.
-        workers: Processes that run side by side.
-        begun: Is told when a job begins; called in any thread.
-        ended: Is told what became of it; called in any thread.
+        engine: Where jobs run side by side.
+        seeds: On how many plants as real as a laboratory's rows are run too.
+        begun: Is told when a job begins.
+        ended: Is told what became of it.
+        seed_ended: Is told of every run on such a plant when it is done.
 
     Raises:
         DeviceError: If the folder cannot be made or written to.
@@ -148,19 +168,53 @@ def run_paper(
     begin = time.monotonic()
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
 
-    def keep(item: Done) -> None:
-        done[item.job] = item
-        ended(item)
-
-    interruption = None
+    interruption: RunInterruptedError | DeviceError | None = None
     try:
-        Processes(folder.path, workers).run(jobs_of(rows), begun, keep)
+        for item in run_jobs(jobs_of(rows), folder.path, engine, begun):
+            done[item.job] = item
+            ended(item)
     except RunInterruptedError as error:
         interruption = error
     lines = tuple(make_line(row, done) for row in rows)
-    report = Report(folder.path, lines, workers, time.monotonic() - begin, load, interruption)
+    if seeds and interruption is None:
+        plants = run_seeds(rows, seeds, engine, out, seed_ended)
+        if plants is not None:
+            lines = tuple(replace(line, plants=over_seeds(line.row, plants)) for line in lines)
+            interruption = plants.interruption
+    report = Report(folder.path, lines, engine.jobs, time.monotonic() - begin, load, interruption, seeds)
     _write(report, folder)
     return report
+
+
+def run_jobs(
+    jobs: Sequence[Job], folder: Path, engine: Engine, begun: Callable[[Job], None]
+) -> Iterator[Done]:
+    """Run jobs, first those that need the machine for themselves, one by one; yield what became of each.
+
+    Args:
+        jobs: What to run.
+        folder: Where the jobs write.
+        engine: Where the others run.
+        begun: Is told when a job begins.
+
+    Raises:
+        RunInterruptedError: If a signal came; running jobs were told to stop, and did or were killed.
+    """
+    alone = [(job, folder) for job in jobs if job.alone]
+    rest = [(job, folder) for job in jobs if not job.alone]
+    with Interruption() as interruption:
+        for some, where in ((alone, ALONE), (rest, engine)):
+            for (job, _), outcome in outcomes(
+                where,
+                do,
+                some,
+                check=interruption.check,
+                begun=lambda order: begun(order[0]),
+                deadline_s=TIME_LIMIT_S,
+            ):
+                if isinstance(outcome, Crash):
+                    outcome = Done(job, {}, outcome.reason, TIME_LIMIT_S, 1)
+                yield outcome
 
 
 def _write(report: Report, folder: RunFolder) -> None:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from tcrctl.errors import StoppedError
-from tcrctl.paper.job import Job
-from tcrctl.paper.processes import Done
+from tcrctl.paper.job import Done, Job
+from tcrctl.paper.over_seeds import TITLES as PLANT_TITLES
+from tcrctl.paper.over_seeds import OverSeeds
 from tcrctl.paper.row import Row, Verdict
 
 TITLES: Final = ("work", "paper", "must reach", "going to", "measured", "verdict")
@@ -34,6 +35,7 @@ class Line:
         reason: Why there is no number; empty if there is one.
         measured: The number with all that belongs to it, as text.
         logs: Logs of its runs.
+        plants: The number over many plants as real as a laboratory's, if that was asked.
     """
 
     row: Row
@@ -42,14 +44,17 @@ class Line:
     reason: str
     measured: str
     logs: tuple[str, ...]
+    plants: OverSeeds | None = None
 
-    def cells(self) -> tuple[str, ...]:
-        """Return texts in the order of ``TITLES``."""
+    def cells(self, *, with_plants: bool = False) -> tuple[str, ...]:
+        """Return texts in the order of :func:`titles`."""
         row, sign = self.row, ">= " if self.row.at_least else ""
         work = f"{row.work} [{row.unit}]" if row.unit else row.work
         bars = ("" if limit is None else f"{sign}{limit:g}" for limit in (row.must, row.goal))
         word = _WORDS[self.verdict]
-        return (work, row.paper, *bars, self.measured, f"{word}: {self.reason}" if self.reason else word)
+        plants = ("",) * len(PLANT_TITLES) if self.plants is None else self.plants.cells()
+        verdict = f"{word}: {self.reason}" if self.reason else word
+        return (work, row.paper, *bars, self.measured, verdict, *(plants if with_plants else ()))
 
     def as_json(self) -> dict[str, Any]:
         """Return the item of ``rows`` in ``tcrctl paper --json``."""
@@ -66,6 +71,7 @@ class Line:
             "verdict": self.verdict,
             "reason": self.reason,
             "logs": list(self.logs),
+            "on_moderate_plants": None if self.plants is None else self.plants.as_json(),
         }
 
 
@@ -95,6 +101,16 @@ def _is_failure(row: Row, item: Done) -> bool:
     return bool(item.reason) and not (row.may_stop and stopped)
 
 
+def titles(lines: Sequence[Line]) -> tuple[str, ...]:
+    """Return the titles of the columns; those of many plants if some row was run on them."""
+    return (*TITLES, *PLANT_TITLES) if any(line.plants for line in lines) else TITLES
+
+
+def cells(lines: Sequence[Line]) -> list[tuple[str, ...]]:
+    """Return texts of all rows, a cell for every title."""
+    return [line.cells(with_plants=any(line.plants for line in lines)) for line in lines]
+
+
 def markdown(lines: Sequence[Line], notes: Sequence[str]) -> str:
     """Return the table as Markdown.
 
@@ -102,7 +118,8 @@ def markdown(lines: Sequence[Line], notes: Sequence[str]) -> str:
         lines: The rows.
         notes: Sentences below the table.
     """
-    rows = [TITLES, ("---",) * len(TITLES), *(line.cells() for line in lines)]
+    head = titles(lines)
+    rows = [head, ("---",) * len(head), *cells(lines)]
     table = "\n".join("| " + " | ".join(_escaped(cell) for cell in row) + " |" for row in rows)
     return f"{table}\n\n{' '.join(notes)}\n"
 

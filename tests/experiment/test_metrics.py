@@ -115,7 +115,9 @@ def test_overruns_are_steps_that_missed_their_period_by_the_clock():
 
 
 def summary(found, criteria=()):
-    made = Summary("id", "spec", "robot", "simulated", "ioc", "success", "", 0, found, (), Path("log.mcap"))
+    made = Summary(
+        "id", "spec", "robot", "simulated", "ioc", 0, (), "success", "", 0, found, (), Path("log.mcap")
+    )
     return replace(made, criteria=judge([parse_criterion(text) for text in criteria], made.as_json()))
 
 
@@ -125,6 +127,8 @@ KEYS = [
     "robot",
     "plant",
     "controller",
+    "seed",
+    "overrides",
     "status",
     "reason",
     "steps",
@@ -143,6 +147,7 @@ KEYS = [
     "criteria",
     "log",
     "task",
+    "versions",
 ]
 
 

@@ -80,6 +80,7 @@ def test_the_folder_holds_the_run_and_everything_to_repeat_it(short, finished):
         "log.mcap",
         "spec.yaml",
         "spec.resolved.yaml",
+        "robot.yaml",
         "summary.json",
     }
     given = short.loaded.path.read_bytes()

@@ -17,6 +17,7 @@ from support.identify_data import (
     true_robot,
 )
 from tcrctl.errors import InputError, RunInterruptedError
+from tcrctl.executors.engine import Engine
 from tcrctl.identify import identification as module
 from tcrctl.identify.building import build_regression, with_lengths
 from tcrctl.identify.evaluation import Evaluator
@@ -72,7 +73,7 @@ def test_sensitivities_through_the_tangent_are_those_of_finite_differences(path,
 
 def test_least_squares_finds_known_moduli_in_noisy_data(tmp_path):
     data = static_data(true_robot(LONG, springs=0.75, cables=1.2), noise_mm=0.1)
-    result = identify(identification(tmp_path, data, (SPRINGS, CABLES), LONG), jobs=1)
+    result = identify(identification(tmp_path, data, (SPRINGS, CABLES), LONG), engine=Engine(1))
     start = load_robot(LONG)
     assert found(result)[SPRINGS] == pytest.approx(0.75 * start.springs.youngs_modulus_mpa, rel=0.02)
     assert found(result)[CABLES] == pytest.approx(1.2 * start.cables.youngs_modulus_mpa, rel=0.02)
@@ -88,7 +89,7 @@ def test_the_spread_that_is_told_is_the_spread_over_repeated_measurements(tmp_pa
     errors = []
     for seed in range(6):
         loaded = identification(tmp_path, static_data(truth, noise_mm=0.2, seed=seed), (SPRINGS,))
-        result = identify(loaded, jobs=1)
+        result = identify(loaded, engine=Engine(1))
         true_value = 0.9 * load_robot(ROBOT).springs.youngs_modulus_mpa
         errors.append((found(result)[SPRINGS] - true_value) / result.certainty.std[0])
     assert 0.5 < np.std(errors) < 1.7  # 6 draws of a unit normal
@@ -99,7 +100,7 @@ def test_the_spread_that_is_told_is_the_spread_over_repeated_measurements(tmp_pa
 def test_a_common_scale_of_stiffness_and_mass_is_flagged(tmp_path, strung_by):
     data = static_data(true_robot(LONG), noise_mm=0.1)
     loaded = identification(tmp_path, data, (SPRINGS, CABLES, MASS), LONG, strung_by=strung_by)
-    result = identify(loaded, jobs=1)
+    result = identify(loaded, engine=Engine(1))
     common = [c for c in result.certainty.combinations if set(c.weights) == {SPRINGS, CABLES, MASS}]
     assert common
     assert list(common[0].weights.values()) == pytest.approx([1.0, 1.0, 1.0], abs=0.5)
@@ -126,7 +127,7 @@ def test_scaling_every_force_moves_nothing():
 
 def test_a_parameter_without_influence_is_named(tmp_path):
     data = static_data(true_robot(), noise_mm=0.1)
-    result = identify(identification(tmp_path, data, (SPRINGS, "tension_limit_n")), jobs=1)
+    result = identify(identification(tmp_path, data, (SPRINGS, "tension_limit_n")), engine=Engine(1))
     assert "tension_limit_n has no influence on the data" in result.warnings
     assert not np.isfinite(result.certainty.std[1])
     assert result.as_json()["parameters"]["tension_limit_n"]["std"] is None
@@ -141,7 +142,7 @@ def turned(points):
 def test_an_unknown_frame_is_found_along_with_the_parameters(tmp_path):
     data = static_data(true_robot(springs=0.8), noise_mm=0.05, place=turned)
     frame = {"offset": "fit", "yaw": "fit"}
-    result = identify(identification(tmp_path, data, (SPRINGS,), frame=frame), jobs=1)
+    result = identify(identification(tmp_path, data, (SPRINGS,), frame=frame), engine=Engine(1))
     assert found(result)[SPRINGS] == pytest.approx(
         0.8 * load_robot(ROBOT).springs.youngs_modulus_mpa, rel=0.01
     )
@@ -152,7 +153,7 @@ def test_an_unknown_frame_is_found_along_with_the_parameters(tmp_path):
 def test_a_mirrored_order_of_cables_is_recognised(tmp_path):
     data = static_data(true_robot(), place=lambda points: turned(points * [1.0, -1.0, 1.0]))
     frame = {"offset": "fit", "yaw": "fit", "mirrored": "try"}
-    result = identify(identification(tmp_path, data, (SPRINGS,), frame=frame), jobs=1)
+    result = identify(identification(tmp_path, data, (SPRINGS,), frame=frame), engine=Engine(1))
     assert result.frame.mirrored
     assert result.mean_error_after_mm < 1e-3
 
@@ -167,7 +168,7 @@ def test_ring_centres_the_end_and_single_coordinates_are_enough(tmp_path):
         }
 
     data = static_data(true_robot(springs=1.3), points=points)
-    result = identify(identification(tmp_path, data, (SPRINGS,)), jobs=1)
+    result = identify(identification(tmp_path, data, (SPRINGS,)), engine=Engine(1))
     assert found(result)[SPRINGS] == pytest.approx(
         1.3 * load_robot(ROBOT).springs.youngs_modulus_mpa, rel=1e-4
     )
@@ -177,7 +178,7 @@ def test_displacements_do_not_care_where_the_frame_is(tmp_path):
     drives = [[0, 0, 0, 0], [12, 2, -4, 2], [2, 10, 2, -4]]
     frame = {"offset": "displacement", "reference": "c0", "yaw": "fit"}
     data = static_data(true_robot(springs=0.9), drives_mm=drives, place=turned)
-    result = identify(identification(tmp_path, data, (SPRINGS,), frame=frame), jobs=1)
+    result = identify(identification(tmp_path, data, (SPRINGS,), frame=frame), engine=Engine(1))
     assert found(result)[SPRINGS] == pytest.approx(
         0.9 * load_robot(ROBOT).springs.youngs_modulus_mpa, rel=1e-4
     )
@@ -188,7 +189,7 @@ def test_the_swarm_is_repeatable_also_in_worker_processes(tmp_path):
     swarm = {"particles": 4, "iterations": 3}
     data = static_data(true_robot(springs=0.75), noise_mm=0.1, drives_mm=[[12, 2, -4, 2], [6, 6, 6, 6]])
     loaded = identification(tmp_path, data, (SPRINGS,), method="pso", pso=swarm, seed=5)
-    here, there = identify(loaded, jobs=1), identify(loaded, jobs=2)
+    here, there = identify(loaded, engine=Engine(1)), identify(loaded, engine=Engine(2))
     assert here.values == pytest.approx(there.values, rel=1e-12)
     assert here.mean_error_after_mm < here.mean_error_before_mm
     assert here.stages[0].evaluations == there.stages[0].evaluations == 12
@@ -205,7 +206,7 @@ def test_an_interruption_keeps_the_best_answer_so_far(tmp_path, monkeypatch):
 
     monkeypatch.setattr(module, "Interruption", Impatient)
     loaded = identification(tmp_path, static_data(true_robot(springs=0.6), noise_mm=0.1), (SPRINGS, CABLES))
-    result = identify(loaded, jobs=1)
+    result = identify(loaded, engine=Engine(1))
     assert (result.status, result.exit_code, result.certainty) == ("aborted", 130, None)
     assert result.mean_error_after_mm < result.mean_error_before_mm
     assert result.as_json()["held_out_error_mm"] is None
@@ -216,19 +217,19 @@ def test_fewer_data_than_unknowns_are_refused(tmp_path):
     data = static_data(true_robot(), drives_mm=drives, points=points)
     frame = {"offset": "fit", "yaw": "fit"}
     with pytest.raises(InputError, match="3 measured coordinates are too few for 6 unknowns"):
-        identify(identification(tmp_path, data, frame=frame), jobs=1)
+        identify(identification(tmp_path, data, frame=frame), engine=Engine(1))
 
 
 def test_a_unit_off_by_1000_is_noticed(tmp_path):
     data = static_data(true_robot(), place=lambda points: points / 1e3)
     with pytest.raises(InputError, match="spread over") as raised:
-        identify(identification(tmp_path, data), jobs=1)
+        identify(identification(tmp_path, data), engine=Engine(1))
     assert "mm" in raised.value.hint
 
 
 def test_the_shipped_robot_and_the_identified_one_predict_table_2():
     """Acceptance: 7.0 mm as shipped, where the paper's identified model has 7.77 mm, and 5.5 mm after."""
-    result = identify(load_identification("identify_table2", ["method=least-squares"]), jobs=1)
+    result = identify(load_identification("identify_table2", ["method=least-squares"]), engine=Engine(1))
     assert result.mean_error_before_mm <= 7.0
     assert result.mean_error_after_mm <= 5.5
     assert len(result.parameters) <= 4
@@ -240,7 +241,7 @@ def test_the_shipped_robot_and_the_identified_one_predict_table_2():
 def test_predictions_cross_to_a_worker_unchanged(tmp_path):
     regression, _ = build_regression(identification(tmp_path, static_data(true_robot())))
     x = start_of(regression.parameters)
-    with Evaluator(regression, 2, lambda: None) as evaluator:
+    with Evaluator(regression, Engine(2), lambda: None) as evaluator:
         first, second = evaluator.predict_many([x, x + 0.01])
     assert np.array_equal(first, regression.predict(x))
     assert not np.array_equal(first, second)

@@ -1,45 +1,40 @@
-"""The comparison with the paper: rows as data, jobs as processes, verdicts, and what is kept when it is stopped."""
+"""The comparison with the paper: rows as data, jobs side by side, verdicts, and what is kept when it is stopped."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
-import sys
 import threading
 import time
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from support.jobs import Killed, Marked, Patient, Result
+from support.studies import study_file
 from tcrctl.cli.app import main
 from tcrctl.errors import RunInterruptedError, UnknownNameError
+from tcrctl.executors.engine import Engine
 from tcrctl.experiment.spec import load_spec
+from tcrctl.paper import over_seeds as over_plants
 from tcrctl.paper import paper
 from tcrctl.paper.checks import CHECKS
-from tcrctl.paper.job import Check, Run
-from tcrctl.paper.paper import choose, jobs_of, run_paper
-from tcrctl.paper.processes import Done, Processes
-from tcrctl.paper.report import TITLES, make_line, markdown
+from tcrctl.paper.job import Check, Done, Run, do
+from tcrctl.paper.over_seeds import experiments_of, over_seeds
+from tcrctl.paper.paper import choose, jobs_of, run_jobs, run_paper
+from tcrctl.paper.report import TITLES, cells, make_line, markdown, titles
 from tcrctl.paper.row import Row, found, total, worst
 from tcrctl.paper.table import ROWS
 from tcrctl.paper.table2 import CONFIGURATIONS, measured_displacements, model_displacements
-
-
-@dataclass(frozen=True)
-class Script:
-    """A job that runs a little program."""
-
-    label: str
-    program: str
-    alone: bool = False
-
-    def command(self, folder: Path) -> list[str]:
-        return [sys.executable, "-c", self.program, str(folder)]
+from tcrctl.study.design import Cell
+from tcrctl.study.loading import load_study
+from tcrctl.study.plan import PlannedRun
+from tcrctl.study.row import Row as StudyRow
+from tcrctl.study.sweep import Done as StudyDone
 
 
 def nothing(item):
@@ -47,9 +42,7 @@ def nothing(item):
 
 
 def collected(jobs, folder, workers=2):
-    done = {}
-    Processes(folder, workers).run(jobs, nothing, lambda item: done.update({item.job: item}))
-    return done
+    return {item.job: item for item in run_jobs(jobs, folder, Engine(workers), nothing)}
 
 
 def row(job, must=1.0, goal=0.1, **changes):
@@ -86,7 +79,7 @@ def test_an_unknown_row_is_refused_with_those_there_are():
 @given(st.floats(0, 10), st.floats(0, 10), st.floats(0, 10), st.booleans())
 def test_a_better_value_never_gets_a_worse_verdict(value, other, span, at_least):
     must, goal = (5.0, 5.0 + span) if at_least else (5.0, 5.0 - span)
-    judged = row(Script("a", ""), must, goal, at_least=at_least)
+    judged = row(Result("a"), must, goal, at_least=at_least)
     ranks = {"missed": 0, "met": 1, "goal": 2}
     better, worse = (max, min) if at_least else (min, max)
     good, bad = better(value, other), worse(value, other)
@@ -95,10 +88,10 @@ def test_a_better_value_never_gets_a_worse_verdict(value, other, span, at_least)
 
 
 def test_without_a_bar_nothing_is_missed_and_without_a_value_it_is_a_failure():
-    assert row(Script("a", ""), None, None).verdict(99.0) == "shown"
-    assert row(Script("a", ""), None, 1.0).verdict(99.0) == "shown"
-    assert row(Script("a", ""), None, 1.0).verdict(0.5) == "goal"
-    assert row(Script("a", "")).verdict(None) == "failed"
+    assert row(Result("a"), None, None).verdict(99.0) == "shown"
+    assert row(Result("a"), None, 1.0).verdict(99.0) == "shown"
+    assert row(Result("a"), None, 1.0).verdict(0.5) == "goal"
+    assert row(Result("a")).verdict(None) == "failed"
 
 
 def test_values_are_found_through_maps_and_lists():
@@ -110,41 +103,24 @@ def test_values_are_found_through_maps_and_lists():
     assert worst("p.max")([result, {"p": None}]) is None
 
 
-#: Leaves a mark while it runs; waits for another one if it is to run beside it, else looks whether there is none.
-MARKED = """
-import json, sys, time
-from pathlib import Path
-folder, name, partner = Path(sys.argv[1]), {name!r}, {partner!r}
-(folder / name).touch()
-begin = time.monotonic()
-while partner and not (folder / partner).exists() and time.monotonic() - begin < 30.0:
-    time.sleep(0.01)
-time.sleep(0.2)
-print(json.dumps({{"x": sorted(path.name for path in folder.iterdir())}}))
-if not partner:
-    (folder / name).unlink()
-"""
-
-
+@pytest.mark.slow
 def test_jobs_run_side_by_side_but_those_alone_do_not(tmp_path):
-    partners = {"a": "", "b": "", "c": "d", "d": "c"}
-    jobs = [Script(n, MARKED.format(name=n, partner=p), alone=not p) for n, p in partners.items()]
+    jobs = [Marked("a", alone=True), Marked("b", alone=True), Marked("c", "d"), Marked("d", "c")]
     seen = {job.label: item.result["x"] for job, item in collected(jobs, tmp_path).items()}
     assert seen == {"a": ["a"], "b": ["b"], "c": ["c", "d"], "d": ["c", "d"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("program", "reason"),
+    ("job", "reason"),
     [
-        ('print(\'{"reason": "diverged"}\'); raise SystemExit(4)', "diverged"),
-        ("import sys; print('no such robot', file=sys.stderr); sys.exit(2)", "exit code 2: no such robot"),
-        ("raise SystemExit(0)", "exit code 0: it said nothing"),
-        ("print('not json')", "it said nothing"),
-        ("import os; os.kill(os.getpid(), 9)", "ended by SIGKILL"),
+        (Result("a", (("reason", "diverged"),), 4), "diverged"),
+        (Result("a", error="no such robot"), "no such robot"),
+        (Result("a"), "exit code 0"),
+        (Killed("a"), "its process ended by itself"),
     ],
 )
-def test_a_failed_job_is_a_row_with_its_reason(program, reason, tmp_path):
-    job = Script("a", program)
+def test_a_failed_job_is_a_row_with_its_reason(job, reason, tmp_path):
     line = make_line(row(job), collected([job], tmp_path))
     assert (line.verdict, line.value) == ("failed", None)
     assert line.reason.startswith("a: ")
@@ -152,21 +128,21 @@ def test_a_failed_job_is_a_row_with_its_reason(program, reason, tmp_path):
 
 
 def test_that_a_run_was_stopped_is_a_result_where_the_row_says_so(tmp_path):
-    job = Script("a", 'print(\'{"x": 70.0, "reason": "diverged"}\'); raise SystemExit(4)')
-    done = collected([job], tmp_path)
+    job = Result("a", (("x", 70.0), ("reason", "diverged")), 4)
+    done = {job: do((job, tmp_path))}
     may = make_line(row(job, None, None, text=lambda results: "diverges", may_stop=True), done)
     assert (may.verdict, may.value, may.measured, may.reason) == ("shown", 70.0, "diverges", "")
     assert make_line(row(job, None, None), done).verdict == "failed"
 
 
 def test_a_run_that_misses_its_own_criterion_is_still_measured(tmp_path):
-    job = Script("a", 'print(\'{"x": 0.5, "log": "l.mcap"}\'); raise SystemExit(3)')
-    line = make_line(row(job), collected([job], tmp_path))
+    job = Result("a", (("x", 0.5), ("log", "l.mcap")), 3)
+    line = make_line(row(job), {job: do((job, tmp_path))})
     assert (line.verdict, line.value, line.logs) == ("met", 0.5, ("l.mcap",))
 
 
 def test_the_markdown_table_has_a_cell_for_every_title():
-    job = Script("a", "")
+    job = Result("a")
     lines = [
         make_line(row(job), {job: Done(job, {"x": 0.5}, "", 1.0)}),
         make_line(row(job), {job: Done(job, {}, "a | b\nc", 1.0)}),
@@ -178,28 +154,18 @@ def test_the_markdown_table_has_a_cell_for_every_title():
     assert lines[2].verdict == "not run"
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_the_jobs_and_keeps_what_is_done(tmp_path):
-    quick = Script("quick", "print('{\"x\": 0.05}')", alone=True)
-    slow = Script(
-        "slow",
-        "import sys, time\ntry:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n"
-        "    open(sys.argv[1] + '/safe', 'w').close(); raise SystemExit(130)",
-    )
-    begun = threading.Event()
+    quick, slow = Result("quick", (("x", 0.05),), alone=True), Patient("slow")
 
     def press():
-        begun.wait(20.0)
-        time.sleep(0.5)
+        patience = time.monotonic() + 60.0
+        while not list(tmp_path.glob("*/running")) and time.monotonic() < patience:
+            time.sleep(0.05)
         os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=press).start()
-    report = run_paper(
-        [row(quick), row(slow)],
-        out=tmp_path,
-        workers=2,
-        begun=lambda job: begun.set() if job == slow else None,
-        ended=nothing,
-    )
+    report = run_paper([row(quick), row(slow)], out=tmp_path, engine=Engine(2), begun=nothing, ended=nothing)
     assert (report.exit_code, report.as_json()["status"]) == (130, "aborted")
     assert isinstance(report.interruption, RunInterruptedError)
     assert [line.verdict for line in report.lines] == ["goal", "not run"]
@@ -207,12 +173,9 @@ def test_ctrl_c_stops_the_jobs_and_keeps_what_is_done(tmp_path):
     assert json.loads((report.folder / "paper.json").read_text())["rows"][0]["measured"] == 0.05
 
 
+@pytest.mark.slow
 def test_the_command_prints_one_object_and_exits_with_3_if_a_bar_is_missed(tmp_path, capsys, monkeypatch):
-    jobs = [
-        Script("good", "print('{\"x\": 0.5}')"),
-        Script("bad", "print('{\"x\": 1.5}')"),
-        Script("ugly", "raise SystemExit(1)"),
-    ]
+    jobs = [Result("good", (("x", 0.5),)), Result("bad", (("x", 1.5),)), Result("ugly", code=1)]
     rows = tuple(
         Row(job.label, "work", "2.3", "mm", 1.0, 0.1, (job,), worst("x"), False, None) for job in jobs
     )
@@ -236,6 +199,47 @@ def test_the_command_prints_one_object_and_exits_with_3_if_a_bar_is_missed(tmp_p
     assert all({"paper.md", "paper.json"} <= {p.name for p in folder.iterdir()} for folder in folders)
 
 
+def plants(**by_name):
+    """A study with the largest errors of some experiments, plant by plant; None: stopped."""
+    runs, rows = [], []
+    for name, errors in by_name.items():
+        for seed, error in enumerate(errors, start=1):
+            address = f"{name}{seed}"
+            runs.append(PlannedRun(address, {"experiment": name}, seed, Cell(name, None, {})))
+            result = {"position_error_mm": {"max": error}}
+            rows.append(StudyRow(address, *(("success", "", result) if error else ("aborted", "diverged"))))
+    return StudyDone(tuple(runs), tuple(rows), 0, 1.0, 0, None)
+
+
+def test_a_row_over_plants_takes_the_worst_of_its_runs_on_each_and_counts_who_was_stopped():
+    letters = Row(
+        "l", "letters", "6.3", "mm", 3.0, 0.5, (Run("heart"), Run("letter_t")), worst("position_error_mm.max")
+    )
+    found = over_seeds(letters, plants(heart=[1.0, 5.0, 2.0, None], letter_t=[3.0, 1.0, 2.0, 1.0]))
+    assert (found.spread.n, found.spread.median, found.spread.worst) == (4, 4.0, float("inf"))
+    assert (found.stopped.count, found.as_json()["worst"]) == (1, None)
+    assert over_seeds(letters, plants(heart=[1.0])) is None
+
+
+def test_only_shipped_experiments_are_run_on_other_plants_and_never_for_their_time():
+    measured = {row.name for row in ROWS if experiments_of(row)}
+    assert {"letters", "helix", "laser_beam", "box_scan", "dynamic_10s"} <= measured
+    assert measured.isdisjoint({"letters_perfect", "static_10s", "table2", "control_p50", "kinematic"})
+    known = load_study("realistic").spec.experiments
+    assert {name for row in ROWS if row.must is not None for name in experiments_of(row)} <= {*known}
+
+
+def test_the_columns_of_many_plants_are_there_only_if_they_were_asked():
+    job = Result("a")
+    line = make_line(row(job), {job: Done(job, {"x": 0.5}, "", 1.0)})
+    letter = Row("t", "T", "6.3", "mm", 3.0, 0.5, (Run("letter_t"),), worst("position_error_mm.max"))
+    more = replace(line, plants=over_seeds(letter, plants(letter_t=[1.0, 2.0, 3.0])))
+    assert titles([line]) == TITLES
+    assert len(titles([line, more])) == len(TITLES) + 3
+    assert {len(texts) for texts in cells([line, more])} == {len(TITLES) + 3}
+    assert "| 2 [1, 3] | 3 | 0 of 3 |" in markdown([line, more], [])
+
+
 def test_the_displacements_of_table_2_keep_their_lengths_in_the_robots_frame(tcr700):
     measured = measured_displacements()
     lengths = [133.1, 91.0, 229.0]  # the table's relative errors are parts of these, [TCR, Table II]
@@ -255,3 +259,18 @@ def test_a_real_row_from_the_command_to_the_number(tmp_path, capsys):
     (line,) = json.loads(capsys.readouterr().out)["rows"]
     assert line["verdict"] == "met"
     assert line["measured"] == pytest.approx(6.80, abs=0.02)
+
+
+@pytest.mark.slow
+def test_the_command_runs_rows_on_other_plants_and_keeps_them_in_the_study(tmp_path, capsys, monkeypatch):
+    letter = Row("t", "T", "6.3", "mm", 3.0, 0.5, (Run("letter_t"),), worst("position_error_mm.max"))
+    monkeypatch.setattr(paper, "ROWS", (letter,))
+    monkeypatch.setattr(over_plants, "STUDY", str(study_file(tmp_path)))  # of short runs
+    order = ["paper", "--seeds", "3", "--jobs", "1", "--json", "--quiet", "--out", str(tmp_path)]
+    assert main(order) == 0
+    (line,) = json.loads(capsys.readouterr().out)["rows"]
+    plants = line["on_moderate_plants"]
+    assert (plants["n"], plants["stopped"]) == (3, 0)
+    assert plants["low"] <= plants["median"] <= plants["high"] <= plants["worst"]
+    rows = (tmp_path / "quick.study" / "rows.jsonl").read_bytes().splitlines()
+    assert len(rows) == 3

@@ -1,0 +1,104 @@
+"""What a study leaves in its folder beside the rows: tables for people and programs, written anew every time."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from tcrctl.errors import DeviceError
+from tcrctl.study.groups import Difference, Group, differences, done, groups
+from tcrctl.study.settings import StudySpec
+from tcrctl.study.sweep import Done
+from tcrctl.study.table import Table, tidy, times
+from tcrctl.study.text import Format, TextTable, difference_table, group_table
+
+TABLE: Final = "table.csv"
+PARQUET: Final = "table.parquet"
+TIMES: Final = "times.csv"
+SUMMARY: Final = "summary.md"
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What a study says so far.
+
+    Attributes:
+        spec: The study.
+        table: One row per run.
+        times: What is of one run.
+        groups: Runs that differ in nothing but the seed.
+        differences: Pairs, if the study compares.
+    """
+
+    spec: StudySpec
+    table: Table
+    times: Table
+    groups: tuple[Group, ...]
+    differences: tuple[Difference, ...]
+
+    def tables(self, *, brief: bool = False) -> list[TextTable]:
+        """Return groups, and differences if there are any, as text; brief: as in :func:`group_table`."""
+        found = [group_table(self.groups, brief=brief)]
+        if self.spec.compare is not None and self.differences:
+            found.append(
+                difference_table(self.differences, self.spec.compare.factor, self.spec.compare.against)
+            )
+        return found
+
+    def text(self, form: Format) -> str:
+        """Return all tables in one of the formats."""
+        return "\n".join(table.formatted(form) for table in self.tables())
+
+    def as_json(self) -> dict[str, Any]:
+        """Return groups and differences for programs; infinite and unknown numbers become null."""
+        return {
+            "groups": [_plain(dataclasses.asdict(group)) for group in self.groups],
+            "differences": [_plain(dataclasses.asdict(item)) for item in self.differences],
+        }
+
+
+def findings(spec: StudySpec, result: Done) -> Findings:
+    """Work out what a study says, from the runs that are done."""
+    runs = done(result.runs, result.rows)
+    return Findings(
+        spec,
+        tidy(result.runs, result.rows),
+        times(result.runs, result.rows),
+        tuple(groups(spec, runs)),
+        tuple(differences(spec, runs)),
+    )
+
+
+def write(found: Findings, folder: Path, *, parquet: bool = False) -> None:
+    """Write all tables of a study into its folder, each whole or not at all.
+
+    Raises:
+        InputError: If Parquet is wanted and pyarrow not installed.
+        DeviceError: If a file cannot be written.
+    """
+    title = f"# {found.spec.name}\n\n" + (f"{found.spec.description}\n\n" if found.spec.description else "")
+    _replace(folder / TABLE, found.table.csv())
+    _replace(folder / TIMES, found.times.csv())
+    _replace(folder / SUMMARY, title + found.text("markdown"))
+    if parquet:
+        found.table.write_parquet(folder / PARQUET)
+
+
+def _replace(path: Path, text: str) -> None:
+    beside = path.with_name(f"{path.name}.part")
+    try:
+        beside.write_text(text, encoding="utf-8")
+        os.replace(beside, path)
+    except OSError as error:
+        raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,71 @@
+"""What is kept of a run that is done."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, Literal, TypeAlias
+
+Status: TypeAlias = Literal["success", "failed", "aborted", "error", "infeasible", "timeout", "crashed"]
+"""As in ``run --json``; and: the path was refused, the time limit was passed, the process died."""
+
+#: Runs that came to their end.
+FINISHED: Final[tuple[Status, ...]] = ("success", "failed")
+#: What says something of the computer, not of the experiment, and may be tried again.
+OF_THE_MACHINE: Final[tuple[Status, ...]] = ("timeout", "crashed")
+#: Results that no two runs have in common.
+TIMING: Final = ("control_ms", "latency_ms", "overruns")
+#: Results that are not of the run, or stand elsewhere in the row.
+_ELSEWHERE: Final = ("run_id", "overrides", "status", "reason", "log", "versions", *TIMING)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A run that is done.
+
+    Attributes:
+        address: What it is found by.
+        status: How it ended.
+        reason: Why; empty for success.
+        result: Object of ``run --json`` as far as it is the same every time; empty if there is none.
+        seconds: Wall time [s].
+        timing: What ``run --json`` says of the time that steps took.
+        log: The log, if one was kept.
+        path: Trajectory that was drawn, and how many were refused before; empty if none was.
+        program: Digest of the program that ran it, :func:`tcrctl.study.address.program`.
+    """
+
+    address: str
+    status: Status
+    reason: str
+    result: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+    timing: Mapping[str, Any] = field(default_factory=dict)
+    log: str | None = None
+    path: Mapping[str, Any] = field(default_factory=dict)
+    program: str = ""
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run came to its end."""
+        return self.status in FINISHED
+
+    def dumps(self) -> bytes:
+        """Return the row as one line of JSON."""
+        return json.dumps(dataclasses.asdict(self), separators=(",", ":")).encode() + b"\n"
+
+
+def loads(line: bytes) -> Row | None:
+    """Read a line; return None if it is not one that was written whole."""
+    try:
+        data = json.loads(line)
+        return Row(**data) if line.endswith(b"\n") else None
+    except (ValueError, TypeError):
+        return None
+
+
+def same_every_time(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of a result that does not depend on when and where the run was."""
+    return {key: value for key, value in result.items() if key not in _ELSEWHERE}
