@@ -8,8 +8,8 @@ mean only 2/π asin(U / V) of its friction, with mean speed U and dither speed V
     A grows while the end does not go where the prediction said, and shrinks slowly otherwise
 
 The measure is the innovation: the measured end position against the one predicted a period before, averaged over a
-whole wave so that the dither's own trace is not in it. A robot without friction does what is predicted, whatever
-else is wrong with its model, so its drives are left in peace. [ADC94]
+whole wave so that the dither's own trace is not in it, less a part of the motion that was predicted: a wrong model
+misses by that, too. A robot without friction does not miss by more, so its drives are left in peace. [ADC94]
 """
 
 from __future__ import annotations
@@ -101,7 +101,9 @@ class Dither:
             "place": self._place,
             "sizes": self._sizes,
             "expected": self._expected,
+            "position": self._position,
             "errors": self._errors.ravel(),  # a view
+            "motions": self._motions.ravel(),
         }
         return {f"dither_{name}": Kept(values, POSITION) for name, values in kept.items()}
 
