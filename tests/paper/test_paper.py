@@ -14,12 +14,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from support.engines import stay_here
 from support.jobs import Killed, Marked, Patient, Result
+from support.short_runs import short_spec
 from support.studies import study_file
 from tcrctl.cli.app import main
 from tcrctl.errors import RunInterruptedError, UnknownNameError
 from tcrctl.executors.engine import Engine
 from tcrctl.experiment.spec import load_spec
+from tcrctl.paper import job as paper_job
 from tcrctl.paper import over_seeds as over_plants
 from tcrctl.paper import paper
 from tcrctl.paper.checks import CHECKS
@@ -110,17 +113,25 @@ def test_jobs_run_side_by_side_but_those_alone_do_not(tmp_path):
     assert seen == {"a": ["a"], "b": ["b"], "c": ["c", "d"], "d": ["c", "d"]}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("job", "reason"),
     [
         (Result("a", (("reason", "diverged"),), 4), "diverged"),
         (Result("a", error="no such robot"), "no such robot"),
         (Result("a"), "exit code 0"),
-        (Killed("a"), "its process ended by itself"),
     ],
 )
-def test_a_failed_job_is_a_row_with_its_reason(job, reason, tmp_path):
+def test_a_failed_job_is_a_row_with_its_reason(job, reason, tmp_path, monkeypatch):
+    stay_here(monkeypatch)
+    check_failed(job, reason, tmp_path)
+
+
+@pytest.mark.slow
+def test_a_job_that_ends_its_process_is_a_row_with_its_reason(tmp_path):
+    check_failed(Killed("a"), "its process ended by itself", tmp_path)
+
+
+def check_failed(job, reason, tmp_path):
     line = make_line(row(job), collected([job], tmp_path))
     assert (line.verdict, line.value) == ("failed", None)
     assert line.reason.startswith("a: ")
@@ -175,6 +186,7 @@ def test_ctrl_c_stops_the_jobs_and_keeps_what_is_done(tmp_path):
 
 @pytest.mark.slow
 def test_the_command_prints_one_object_and_exits_with_3_if_a_bar_is_missed(tmp_path, capsys, monkeypatch):
+    stay_here(monkeypatch)
     jobs = [Result("good", (("x", 0.5),)), Result("bad", (("x", 1.5),)), Result("ugly", code=1)]
     rows = tuple(
         Row(job.label, "work", "2.3", "mm", 1.0, 0.1, (job,), worst("x"), False, None) for job in jobs
@@ -263,9 +275,11 @@ def test_a_real_row_from_the_command_to_the_number(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_the_command_runs_rows_on_other_plants_and_keeps_them_in_the_study(tmp_path, capsys, monkeypatch):
+    stay_here(monkeypatch)
+    monkeypatch.setattr(paper_job, "load_spec", lambda name, overrides: short_spec("plant.step_ms=10"))
     letter = Row("t", "T", "6.3", "mm", 3.0, 0.5, (Run("letter_t"),), worst("position_error_mm.max"))
     monkeypatch.setattr(paper, "ROWS", (letter,))
-    monkeypatch.setattr(over_plants, "STUDY", str(study_file(tmp_path)))  # of short runs
+    monkeypatch.setattr(over_plants, "STUDY", str(study_file(tmp_path)))  # of short runs too
     order = ["paper", "--seeds", "3", "--jobs", "1", "--json", "--quiet", "--out", str(tmp_path)]
     assert main(order) == 0
     (line,) = json.loads(capsys.readouterr().out)["rows"]

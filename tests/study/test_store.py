@@ -115,7 +115,7 @@ with Store(Path(sys.argv[1])) as store:
 @pytest.mark.slow
 def test_kill_9_in_the_middle_of_writing_leaves_whole_rows(tmp_path):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    for _ in range(5):
+    for _ in range(3):
         writer = subprocess.Popen(
             [sys.executable, "-c", WRITER, str(tmp_path)], env=environment, stdout=subprocess.PIPE
         )

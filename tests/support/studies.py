@@ -1,4 +1,4 @@
-"""Studies of runs that take a second: a short letter with a coarse plant."""
+"""Studies of runs that take a quarter of a second: a short letter with a coarse plant."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from tcrctl.config import strict_yaml
 from tcrctl.study.loading import load_study
 
 QUICK = {key: strict_yaml.loads(text).data for key, _, text in (item.partition("=") for item in SHORT)}
-QUICK["plant.step_ms"] = 5.0
+QUICK["plant.step_ms"] = 10.0
 SOFT = "plant.mismatch.springs_youngs_modulus"
 
 

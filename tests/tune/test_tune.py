@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from support.studies import QUICK, quick_study, study_file
+from support.engines import stay_here
+from support.studies import quick_study, study_file
 from tcrctl.cli.app import main
 from tcrctl.errors import SpecError
 from tcrctl.experiment.spec import load_spec
@@ -84,12 +85,12 @@ def test_a_study_that_cannot_be_tuned_says_where_and_why(changes, message, tmp_p
 
 
 @pytest.mark.slow
-def test_a_bad_setting_is_found_out_and_the_file_that_is_written_is_better_and_says_why(tmp_path, capsys):
-    bad = {**QUICK, "controller.integral": "off", "controller.prediction.offset": "off"}
+def test_a_bad_setting_is_found_out_and_the_file_that_is_written_is_better(tmp_path, capsys, monkeypatch):
+    stay_here(monkeypatch)
     text = load_spec("letter_t").path.read_text().replace("speed_change: 3.5e3", "speed_change: 2.0e5")
     (tmp_path / "sluggish.yaml").write_text(text.replace("name: letter_t", "name: sluggish"))
     study = study_file(
-        tmp_path, experiments=["./sluggish.yaml"], set=bad, seeds="0..1",
+        tmp_path, experiments=["./sluggish.yaml"], seeds=[0],
         vary={WEIGHT: {"low": 200, "high": 200000, "scale": "log", "steps": 2}},
     )  # fmt: skip
     order = [
@@ -98,7 +99,7 @@ def test_a_bad_setting_is_found_out_and_the_file_that_is_written_is_better_and_s
         "--generations",
         "2",
         "--population",
-        "4",
+        "3",
         "--jobs",
         "1",
         "--json",
@@ -109,7 +110,8 @@ def test_a_bad_setting_is_found_out_and_the_file_that_is_written_is_better_and_s
     assert made["better"]
     assert made["settings"][WEIGHT] < 1e5
     assert made["best"] == sorted(made["best"], reverse=True)
-    assert made["held_out_worst_decile"]["after"] < made["held_out_worst_decile"]["before"]
+    judged = made["held_out_worst_decile"]
+    assert judged["after"] < 0.8 * judged["before"]  # a weight 57 times too large costs more than half
     written = load_spec(made["files"][0]).spec
     assert written.controller.weights.speed_change == made["settings"][WEIGHT]
     assert "quick" in written.source
