@@ -89,6 +89,8 @@ class Dither:
     def stand_still(self) -> None:
         """Move no drive from now on: under a periodic input a loop has no equilibrium to linearise about."""
         self.runs = False
+        self._sizes[:] = 0.0
+        self._place[:] = 0.0
 
     def memory(self) -> Mapping[str, Kept]:
         """Return where the dither is, its amplitude and what it compares with, if it runs.

@@ -68,7 +68,7 @@ class Shell:
             integral=at.shift,
             reason=reason,
         )
-        return Command(speed, estimate.set_point + self._settings.period_s * speed), info
+        return Command(speed, estimate.drive + self._settings.period_s * speed), info
 
     def _situation(self, estimate: Estimate, reference: Reference) -> Situation:
         """Move the integral action on, and gather what the planner is told."""
@@ -80,7 +80,7 @@ class Shell:
         stands = planner.anti_windup and bool(self._saturated.any())
         gain = 1.0 + self.dither.now.awake * (self._shaken_integral - 1.0)
         shift = self._integral.update(error, stands, gain)
-        low, high = input_limits(self._settings, self._robot, estimate.set_point, planner.blocks)
+        low, high = input_limits(self._settings, self._robot, estimate.drive, planner.blocks)
         return Situation(
             estimate=estimate,
             reference=reference,

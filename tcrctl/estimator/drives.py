@@ -39,10 +39,14 @@ class BelievedDrives:
         self._sent = np.zeros((math.ceil(self._late) + 1, 0))
         self.reached = self.arrived = self.set_point = np.zeros(0)
 
+    def sharpen(self) -> None:
+        """Search the lag no more: the loop is to be linearised."""
+        self._search = None
+
     def memory(self) -> Mapping[str, Kept]:
         """Return what was sent and has not arrived, and where the drives are if they do not tell.
 
-        The search of the lag is left out: it chooses among candidates, and small changes change no choice.
+        The search of the lag is left out; see :meth:`sharpen`.
         """
         sent = {"sent": Kept(self._sent.ravel(), POSITION)} if self._late > 0.0 else {}
         if self._tell or self.lag == 0.0:

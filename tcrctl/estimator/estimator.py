@@ -17,6 +17,10 @@ from tcrctl.signals import Command, Estimate, Measurement
 class Estimator(Protocol):
     """Turns measurements into states of the robot model."""
 
+    def sharpen(self) -> None:
+        """Search nothing any more, so that the loop can be linearised."""
+        ...
+
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Return the state at the time of ``measured``, ``applied`` being the command since the last update."""
         ...

@@ -25,6 +25,10 @@ class ExactState:
     def __init__(self, robot: Robot, state: TrueState, drives: BelievedDrives) -> None:
         self._robot, self._state, self._drives = robot, state, drives
 
+    def sharpen(self) -> None:
+        """Let the drives be as they are believed to be now; see :class:`BelievedDrives`."""
+        self._drives.sharpen()
+
     def memory(self) -> Mapping[str, Kept]:
         """Return what is kept of the drives; the plant remembers all else."""
         return self._drives.memory()

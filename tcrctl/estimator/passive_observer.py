@@ -129,6 +129,10 @@ class PassiveObserver:
         turned = normal + self._correction[3:]
         return position + self._correction[:3], turned / np.linalg.norm(turned)
 
+    def sharpen(self) -> None:
+        """Let the drives be as they are believed to be now; see :class:`BelievedDrives`."""
+        self._drives.sharpen()
+
     def memory(self) -> Mapping[str, Kept]:
         """Return positions and velocities without the base, drives, pose correction, and the last frame."""
         first = 3 * FIXED

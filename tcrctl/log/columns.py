@@ -80,7 +80,7 @@ def meanings(record: type = StepRecord, prefix: str = "") -> dict[str, str]:
             continue
         if isinstance(inner, type):
             found |= meanings(inner, f"{prefix}{name}_")
-        else:
+        elif prefix + name in COLUMNS:  # a record may tell more than a log
             found[prefix + name] = " ".join(said.get(name, "").split())
     return found
 

@@ -156,7 +156,7 @@ class _Replay:
                 break
             if broken is not None:
                 return "" if next(self._steps, None) is None else str(broken)
-            applied = step.applied
+            applied = step.applied if self._plant.limited is None else self._plant.limited
         return ""
 
     def _parts(self) -> Parts:

@@ -90,6 +90,7 @@ def analyse(
     plant.without_noise()
     parts, _ = build_parts(experiment, plant, state)
     linearisable(parts.controller).sharpen()
+    parts.estimator.sharpen()
     stopped = ""
     with Interruption() as interruption:
         parts = replace(parts, pace=Unpaced(interruption.check))

@@ -17,7 +17,7 @@ import numpy as np
 from tcrctl.errors import InputError
 from tcrctl.loop.loop import Parts, tick
 from tcrctl.loop.safety import SafetyGuard
-from tcrctl.memory import Kept, Remembers
+from tcrctl.memory import POSITION, Kept, Remembers
 from tcrctl.signals import Array, Command, ControlInfo
 
 
@@ -56,6 +56,8 @@ class ClosedLoop:
         parts = self.parts
         owners = {"plant": parts.plant, "estimator": parts.estimator, "controller": parts.controller}
         found: dict[str, Kept] = {}
+        if self.applied is not None:  # from it the drives are known, beside what they report
+            found["loop.set_point"] = Kept(self.applied.drive, POSITION)
         for part, owner in owners.items():
             if not isinstance(owner, Remembers):
                 raise InputError(f"the {part} does not tell what it remembers, so it cannot be linearised")
