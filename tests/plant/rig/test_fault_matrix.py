@@ -28,7 +28,7 @@ from tcrctl.plant.rig.assembly import build_rig
 from tcrctl.plant.rig.operation import Operation
 
 #: What a busy computer may add to any time [s].
-LATE = 3.0
+LATE = 1.0
 WATCHDOG_MS = 400
 
 
