@@ -114,8 +114,6 @@ def _update_offset(
     else:
         forget(memory.share, tuning.learning)
     share = memory.share.share[0]
-    for hole in range(memory.drag.coefficient.shape[0]):
-        memory.drag.coefficient[hole] *= share
     for k in range(force.shape[0]):
         j = 3 * FIXED + k
         memory.offset[j] += tuning.blend * (deviation[j] + lag[k] - share * dragged[k] - memory.offset[j])
@@ -168,6 +166,8 @@ def forecast(
     fill_hole_drag(model, at.equilibrium, ws, memory.friction, tuning.turn, memory.drag)
     if outcome.converged and tuning.blend > 0.0 and finite:
         _update_offset(model, ws, memory, deviation, now, tip, tuning)
+    for hole in range(memory.drag.coefficient.shape[0]):  # what is not learnt is not counted
+        memory.drag.coefficient[hole] *= memory.share.share[0]
     for k in range(q.shape[0]):
         memory.v[k] = v[k]
         away[k] = deviation[k] - memory.offset[k]
@@ -197,7 +197,7 @@ class MultiStep:
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         basis = response.start_basis(robot.model, self._work, settings.modes)
         self._memory = MultiStepMemory(
-            at, still, still.copy(), basis, no_drag(robot.model), _friction(settings, robot), nothing_known()
+            at, still, still.copy(), basis, no_drag(robot.model), _friction(robot), nothing_known()
         )
         self._solved = False
         self._fresh = settings.offset is not None and settings.offset.from_start
@@ -250,7 +250,7 @@ class MultiStep:
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)
 
 
-def _friction(settings: MultiStepSettings, robot: Robot) -> Array:
+def _friction(robot: Robot) -> Array:
     """Return the friction of every hole (n_holes, 3): as the robot file says it, or as usual."""
     if robot.holes is not None:
         return robot.holes

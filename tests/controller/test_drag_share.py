@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from support.closed_loop import ioc, resting, situation
 from tcrctl.controller.drag_share import MOST, forget, learn, learning, nothing_known
+from tcrctl.controller.multi_step import MultiStep
 
 PERIOD = 0.05
 T = PERIOD * np.arange(1200)
@@ -58,3 +60,18 @@ def test_it_is_forgotten_when_nothing_is_told_any_more():
     for _ in range(4000):
         forget(known, numbers)
     assert known.share[0] < 0.05
+
+
+@pytest.mark.parametrize("offset", ["off", {"filter_s": 0.3}])
+def test_drag_that_was_not_learnt_is_not_counted(tcr600, offset):
+    """Also where nothing learns it, because the offset is off."""
+    settings = ioc(offset=offset).prediction
+    speed = np.array([0.01, -0.005, 0.02])
+
+    def free(amplitude):
+        at = situation(tcr600, resting(tcr600), speed, amplitude)
+        return MultiStep(settings, PERIOD, tcr600, 0.0).predict(at).prediction
+
+    calm, dithered = free(0.0), free(2e-3)
+    np.testing.assert_array_equal(dithered.free, calm.free)
+    np.testing.assert_array_equal(dithered.gain, calm.gain)
