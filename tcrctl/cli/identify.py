@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import LOGS, AsJson, Overrides, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, SideBySide, unfolded
 
 if TYPE_CHECKING:
     from tcrctl.identify.loading import LoadedIdentification
@@ -50,7 +50,6 @@ Seed = Annotated[
     int | None, typer.Option("--seed", metavar="N", min=0, max=2**32 - 1, help="Seed of the swarm.")
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where its folder is made.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
 Calibrate = Annotated[

@@ -26,6 +26,9 @@ Overrides: TypeAlias = Annotated[
     ),
 ]
 AsJson: TypeAlias = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+Quiet: TypeAlias = Annotated[
+    bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")
+]
 IsRobot: TypeAlias = Annotated[bool, typer.Option("--robot", help="Robot files instead of experiments.")]
 
 
@@ -61,6 +64,7 @@ def unfolded(verb: Callable[..., None]) -> Callable[..., None]:
 
     Args:
         verb: What a command does; its options have ``Annotated`` types, here or in the fields of dataclasses.
+            Another verb may call it: fields that are not given keep their defaults.
     """
     hints = get_type_hints(verb, include_extras=True)
     groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
@@ -74,7 +78,8 @@ def unfolded(verb: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(verb)
     def command(**given: Any) -> None:
         for name, group in groups.items():
-            given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
+            told = [field.name for field in fields(group) if field.name in given]
+            given[name] = group(**{key: given.pop(key) for key in told})
         verb(**given)
 
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcrctl.cli.options import LOGS, AsJson, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
 
 if TYPE_CHECKING:
     from tcrctl.paper.job import Done, Job
@@ -42,7 +42,6 @@ Seeds = Annotated[
     ),
 ]
 Names = Annotated[bool, typer.Option("--rows", help="Print the names of the rows and run nothing.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 _STYLES = {"goal": "green", "met": "green", "missed": "red", "failed": "red", "not run": "yellow"}
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import LOGS, AsJson, Overrides, Spec, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, Spec, unfolded
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -42,7 +42,6 @@ ViewPort = Annotated[
     int, typer.Option("--view-port", metavar="N", min=0, max=65535, help="Port of it; 0 takes a free one.")
 ]
 Yes = Annotated[bool, typer.Option("--yes", help="A rig: the drives may be armed and move; nobody is asked.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson, Overrides, Spec, unfolded
+from tcrctl.cli.options import AsJson, Overrides, Quiet, Spec, unfolded
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ Figure = Annotated[
     Path | None, typer.Option("--figure", metavar="FILE", help="Draw both curves: .png, .pdf or .svg.")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")]
 
 TABLES = (".csv", ".npz")
 FIGURES = (".png", ".pdf", ".svg")

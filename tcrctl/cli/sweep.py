@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import LOGS, AsJson, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
 
 if TYPE_CHECKING:
     from tcrctl.study.loading import LoadedStudy
@@ -86,7 +86,7 @@ class Shown:
     figures: Annotated[
         str | None, typer.Option("--figures", metavar="FORMAT", help="Draw figures too: png, pdf or svg.")
     ] = None
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages.")] = False
+    quiet: Quiet = False
 
 
 @unfolded

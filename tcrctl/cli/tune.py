@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import LOGS, AsJson, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
 
 if TYPE_CHECKING:
     from tcrctl.study.loading import LoadedStudy
@@ -42,7 +42,7 @@ def tune(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where the study's folder is.")
     ] = Path("logs"),
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")] = False,
+    quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
     """Lower the worst decile of a study's first measure over its seeds, by CMA-ES within its ranges.

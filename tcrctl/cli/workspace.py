@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcrctl.cli.options import LOGS, AsJson, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
 
 if TYPE_CHECKING:
     from tcrctl.workspace.workspace import Workspace
@@ -39,7 +39,7 @@ def workspace(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where the folder is made.")
     ] = Path("logs"),
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")] = False,
+    quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
     """Find end positions and tilts that a robot reaches at rest, with taut cables and within its strokes.

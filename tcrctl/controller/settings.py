@@ -125,6 +125,11 @@ class ControllerSection(Settings):
         return None
 
     @property
+    def shaking(self) -> DitherSettings | None:
+        """Dither; None if there is none."""
+        return None
+
+    @property
     def known_drives(self) -> KnownDrives:
         """What is known of the drives."""
         return KnownDrives()
@@ -186,6 +191,11 @@ class IocSettings(ControllerSection):
                     yield ("weights", key), "has no meaning with output: position; must be 0"
         elif self.weights.normal == 0:
             yield ("weights", "normal"), "must be > 0 with output: pose, or the normal is not tracked"
+
+    @property
+    def shaking(self) -> DitherSettings | None:
+        """Dither; None if there is none."""
+        return self.dither
 
     @property
     def known_drives(self) -> KnownDrives:
@@ -262,10 +272,9 @@ def shaken_speed_change(settings: IocSettings) -> float:
 
 def shaken_integral(settings: IocSettings | KinematicSettings) -> float:
     """Return which part of the integral gain is left while a dither runs."""
-    dither = settings.dither if isinstance(settings, IocSettings) else None
-    if dither is None or settings.integral is None:
+    if settings.shaking is None or settings.integral is None:
         return 1.0
-    return min(1.0, dither.integral_gain_1_s / settings.integral.gain_1_s)
+    return min(1.0, settings.shaking.integral_gain_1_s / settings.integral.gain_1_s)
 
 
 def speed_limit(settings: ControllerSettings) -> float:

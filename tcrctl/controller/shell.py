@@ -41,8 +41,7 @@ class Shell:
         self._normal = robot.rest_normal if settings.output == "pose" else None
         self._speed = np.zeros(robot.n_cables)
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
-        dither = settings.dither if isinstance(settings, IocSettings) else None
-        self.dither = Dither(dither, settings.period_s, robot)
+        self.dither = Dither(settings.shaking, settings.period_s, robot)
         self.ahead = planner.ahead
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:

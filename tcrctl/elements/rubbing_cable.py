@@ -224,6 +224,19 @@ def group_stiffness(s: Stretches, start: int, end: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def largest_friction(hole: Array, along: float, tension: float) -> float:
+    """Return F [N], what a hole holds at most, by the capstan law [SC26].
+
+    Args:
+        hole: Its friction (3,), columns as above.
+        along: Cosine of the angle between the stretches before and behind it.
+        tension: The smaller one of their tensions [N].
+    """
+    wrap = max(np.arccos(min(along, 1.0)), hole[LEAST_WRAP])
+    return float(hole[DRAG] + tension * np.expm1(hole[COEFFICIENT] * wrap))
+
+
+@njit(cache=True, error_model="numpy")
 def begin(slip: Slip, h: float, lead: Array, first_hole: np.ndarray, s: Stretches) -> None:
     """Start an internal step of size ``h`` [s]: elongations before it, and the caps of the holes there.
 
@@ -243,9 +256,8 @@ def begin(slip: Slip, h: float, lead: Array, first_hole: np.ndarray, s: Stretche
                 along = 0.0
                 for i in range(3):
                     along += (lead[i] if k == first else s.direction[k, i]) * s.direction[k + 1, i]
-                wrap = max(np.arccos(min(along, 1.0)), slip.holes[k, LEAST_WRAP])
                 smaller = min(slip.tension[k], slip.tension[k + 1])
-                slip.cap[k] = slip.holes[k, DRAG] + smaller * np.expm1(slip.holes[k, COEFFICIENT] * wrap)
+                slip.cap[k] = largest_friction(slip.holes[k], along, smaller)
 
 
 @njit(cache=True, error_model="numpy")

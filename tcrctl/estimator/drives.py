@@ -1,7 +1,7 @@
 """Where the drives are, from what was sent to them and what they report.
 
 A drive follows the set-point s(t - θ) of a dead time θ ago with a position loop of time constant τ. Drives that
-report where they are tell their lag by it; see :mod:`tcrctl.estimator.drive_lag`.
+report where they are tell their lag by it; see :mod:`tcrctl.estimator.lag_search`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from tcrctl.estimator.drive_lag import LagSearch, follow
+from tcrctl.estimator.lag_search import LagSearch, follow
 from tcrctl.memory import POSITION, Kept
 from tcrctl.signals import Array
 

@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numba import njit
 
-from tcrctl.elements.rubbing_cable import COEFFICIENT, DRAG, LEAST_WRAP
+from tcrctl.elements.rubbing_cable import largest_friction
 from tcrctl.elements.sliding_cable import LEAD, segment, spread
 from tcrctl.robot.equations import Workspace
 from tcrctl.robot.model import Model
@@ -86,13 +86,9 @@ def fill_hole_drag(
         x, bx, by, bz = model.cables[c, LEAD], 0.0, 0.0, 0.0
         for hole in range(first, last):
             length, ex, ey, ez = segment(q, nodes, weights, hole)
-            wrap = friction[hole, LEAST_WRAP]
-            if hole > first:
-                wrap = max(np.arccos(min(bx * ex + by * ey + bz * ez, 1.0)), wrap)
+            along = bx * ex + by * ey + bz * ez if hole > first else 1.0
             ratio = x / total
-            held = friction[hole, DRAG] + max(ws.tension[c], 0.0) * np.expm1(
-                friction[hole, COEFFICIENT] * wrap
-            )
+            held = largest_friction(friction[hole], along, max(ws.tension[c], 0.0))
             drag.coefficient[hole], drag.through[hole] = turn * held, 1.0 - ratio
             for k in range(drag.path.shape[1]):
                 drag.path[hole, k] = row[0, 3 * FIXED + k] - ratio * ws.G[c, 3 * FIXED + k]

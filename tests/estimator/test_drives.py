@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcrctl.estimator.drive_lag import CANDIDATES, LagSearch
 from tcrctl.estimator.drives import BelievedDrives
+from tcrctl.estimator.lag_search import CANDIDATES, LagSearch
 
 PERIOD, FINE = 0.05, 500
 

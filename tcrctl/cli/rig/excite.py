@@ -9,7 +9,7 @@ import typer
 
 from tcrctl.cli.options import AsJson
 from tcrctl.cli.rig.options import Rig, Robot
-from tcrctl.cli.run import run
+from tcrctl.cli.run import DryRun, Out, Yes, run
 
 
 def excite(
@@ -18,13 +18,9 @@ def excite(
     spec: Annotated[
         str, typer.Option("--spec", metavar="SPEC", help="Another excitation, e.g. of identify --design.")
     ] = "excitation",
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the run's folder is made.")] = Path(
-        "logs"
-    ),
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check everything, move nothing.")] = False,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="The drives may be armed and move; nobody is asked.")
-    ] = False,
+    out: Out = Path("logs"),
+    dry_run: DryRun = False,
+    yes: Yes = False,
     as_json: AsJson = False,
 ) -> None:
     """Pull every cable and go through poses, open loop, to calibrate a robot and its cameras from the log.
@@ -36,18 +32,4 @@ def excite(
       tcrctl rig excite my_bench.yaml && tcrctl identify --calibrate logs/TIME_excitation_ID
     """
     overrides = ["plant.kind=rig", f"plant.rig={rig}", *([] if robot is None else [f"robot={robot}"])]
-    run(
-        spec=spec,
-        overrides=overrides,
-        dry_run=dry_run,
-        realtime=False,
-        out=out,
-        seed=None,
-        force=False,
-        view=False,
-        view_host="127.0.0.1",
-        view_port=0,
-        yes=yes,
-        quiet=False,
-        as_json=as_json,
-    )
+    run(spec=spec, overrides=overrides, dry_run=dry_run, out=out, yes=yes, as_json=as_json)
