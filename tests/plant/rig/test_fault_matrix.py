@@ -21,6 +21,7 @@ from support.fault_matrix import (
     suite_cells,
     violations,
 )
+from support.punctual import on_a_punctual_computer
 from tcr_hardware.modbus.registers import Status
 from tcrctl.commissioning.zero import reset_rig
 from tcrctl.errors import ArmingRefusedError, InputError, RigStopError
@@ -34,6 +35,7 @@ WATCHDOG_MS = 400
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("case", "phase"), suite_cells(), ids=lambda x: x if isinstance(x, str) else x.name)
+@on_a_punctual_computer
 def test_a_fault_ends_the_run_safely_and_in_time(case, phase, tcr5x4):
     outcome = play(case, phase, tcr5x4, PATIENT, WATCHDOG_MS)
     assert outcome.state == case.phases()[phase], outcome.events
@@ -51,6 +53,7 @@ def test_a_fault_ends_the_run_safely_and_in_time(case, phase, tcr5x4):
 
 
 @pytest.mark.slow
+@on_a_punctual_computer
 def test_faults_that_do_no_harm_do_not_stop_the_run(tcr5x4):
     """One after the other in one run; a busy computer may hold it in between."""
     harmless = [case for case in CASES if case.moving == "running"]
@@ -74,6 +77,7 @@ def test_faults_that_do_no_harm_do_not_stop_the_run(tcr5x4):
 
 
 @pytest.mark.slow
+@on_a_punctual_computer
 def test_the_watchdog_catches_a_controller_that_hangs(tcr5x4):
     with WatchedEmulators(tcr5x4, PATIENT, watchdog_ms=150) as emulators:
         plant = emulators.plant()
@@ -89,6 +93,7 @@ def test_the_watchdog_catches_a_controller_that_hangs(tcr5x4):
         assert str(plant.supervisor.state) == "faulted"
 
 
+@on_a_punctual_computer
 def test_after_a_fault_nothing_is_armed_until_an_operator_has_reset_it(tcr5x4):
     with WatchedEmulators(tcr5x4, PATIENT, WATCHDOG_MS) as emulators:
         emulators.plc.press_estop()
@@ -116,6 +121,7 @@ def test_after_a_fault_nothing_is_armed_until_an_operator_has_reset_it(tcr5x4):
         assert str(plant.supervisor.state) == "disarmed"
 
 
+@on_a_punctual_computer
 def test_a_rig_file_that_allows_more_than_the_plc_is_refused(tcr5x4):
     with WatchedEmulators(tcr5x4, {**PATIENT, "max_step_mm": 7.0}, WATCHDOG_MS, high_mm=30) as emulators:
         with pytest.raises(InputError) as caught:
@@ -129,6 +135,7 @@ def test_a_rig_file_that_allows_more_than_the_plc_is_refused(tcr5x4):
         build_rig(emulators.loaded(), tcr5x4, 0.15, Operation())
 
 
+@on_a_punctual_computer
 def test_a_label_that_the_cameras_do_not_know_is_refused(tcr5x4):
     with WatchedEmulators(tcr5x4, PATIENT, WATCHDOG_MS) as emulators:
         emulators.motive.change_models([f"marker.{i}" for i in range(15)])
