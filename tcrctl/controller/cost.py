@@ -50,10 +50,18 @@ def make_target(settings: IocSettings, reference: Reference, shift: Array, m: in
 
 
 def input_limits(
-    settings: IocSettings | KinematicSettings, robot: Robot, drive: Array, blocks: int
+    settings: IocSettings | KinematicSettings, robot: Robot, drive: Array, blocks: int, reserve: float = 0.0
 ) -> tuple[Array, Array]:
-    """Return hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke."""
-    limit = speed_limit(settings)
+    """Return hard limits of all inputs (blocks * m,) [m/s]: speed; for the first block also the stroke.
+
+    Args:
+        settings: Speed limit and period.
+        robot: Its stroke.
+        drive: Drive lengths now (m,) [m].
+        blocks: Number of input blocks.
+        reserve: What of the speed limit is kept for something else [m/s].
+    """
+    limit = speed_limit(settings) - reserve
     low = np.full(blocks * drive.shape[0], -limit)
     high = np.full(blocks * drive.shape[0], limit)
     m = drive.shape[0]

@@ -5,11 +5,12 @@ end by millimetres, and a loop that does not know of it hunts. A cable that alwa
 mean only 2/π asin(U / V) of its friction, with mean speed U and dither speed V: a little damping, no relay.
 
     triangle wave of the drive lengths, ± A, sign +1 or -1 by cable so that forces and motions cancel
-    A grows while the end does not go where the prediction said, and shrinks slowly otherwise
+    A grows while less of the wave than ``reach`` gets along the robot, and shrinks while more does
 
-The measure is the innovation: the measured end position against the one predicted a period before, averaged over a
-whole wave so that the dither's own trace is not in it, less a part of the motion that was predicted: a wrong model
-misses by that, too. A robot without friction does not miss by more, so its drives are left in peace. [ADC94]
+Where cables rub the first holes use a small wave up (controller.wave_reach). A robot without friction lets it pass,
+so its drives are soon left in peace. A dither that sleeps is woken, as large as at the start, by the innovation: the
+measured end position against the one predicted a period before, averaged over a whole wave so that the dither's own
+trace is not in it, less a part of the motion that was predicted: a wrong model misses by that, too. [ADC94]
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tcrctl.controller.settings import DitherSettings
+from tcrctl.controller.wave_reach import WaveReach
 from tcrctl.memory import POSITION, Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.robot.swing import signs
-from tcrctl.signals import Array
+from tcrctl.signals import Array, Estimate
 
 #: From this amplitude on a robot counts as dithered, with weights and gains of its own [m].
 AWAKE: Final = 0.5e-3
@@ -53,8 +55,8 @@ class Dither:
         runs: It is on, and was not told to stand still.
     """
 
-    def __init__(self, settings: DitherSettings | None, period: float, robot: Robot) -> None:
-        """Take a ``dither:`` section, or None for none, the control period [s] and the robot."""
+    def __init__(self, settings: DitherSettings | None, period: float, robot: Robot, limit: float) -> None:
+        """Take a ``dither:`` section, or None for none, the control period [s], the robot, the speed limit [m/s]."""
         self._settings = settings or DitherSettings()
         self._period = period
         self.runs = settings is not None
@@ -63,7 +65,12 @@ class Dither:
             self._half_wave // 2
         )  # it begins halfway up, so that the mean of the first wave is zero too
         self._signs = signs(robot) if self.runs else np.zeros(robot.n_cables)
-        self._sizes = np.array([_start(self._settings) if self.runs else 0.0, 0.0])
+        self._most = min(
+            self._settings.most_mm / 1e3, self._settings.speed_part * limit * self._half_wave * period / 2.0
+        )
+        self._start = _start(self._settings, self._most)
+        self._sizes = np.array([self._start if self.runs else 0.0, 0.0])
+        self._reach = WaveReach(robot, self._signs, self._half_wave)
         self._woken = False
         self._place = np.zeros(robot.n_cables)
         self._expects, self._expected = False, np.zeros(3)
@@ -75,6 +82,16 @@ class Dither:
     def amplitude(self) -> float:
         """Half of the travel to and fro [m]."""
         return float(self._sizes[0])
+
+    @property
+    def fastest(self) -> float:
+        """Speed of the drives in the wave [m/s]."""
+        return 2.0 * self.amplitude / (self._half_wave * self._period)
+
+    @property
+    def reach(self) -> float:
+        """Part of the wave that gets along the robot."""
+        return self._reach.share
 
     @property
     def now(self) -> Dithered:
@@ -109,13 +126,37 @@ class Dither:
         }
         return {f"dither_{name}": Kept(values, POSITION) for name, values in kept.items()}
 
-    def observe(self, position: Array) -> None:
-        """Compare the end position with the one expected a period before, and adapt the amplitude.
+    def observe(self, position: Array, estimate: Estimate) -> None:
+        """Look at what has become of the wave and of the expected motion, and adapt the amplitude.
 
         Args:
             position: Measured end position (3,) [m].
+            estimate: The robot, and where its drives are.
         """
-        if not (self.runs and self._expects and np.isfinite(position).all()):
+        if not (self.runs and np.isfinite(position).all() and np.isfinite(estimate.q).all()):
+            self._position[:] = position
+            return
+        self._reach.observe(estimate.q, estimate.drive)
+        self._surprise(position)
+        amplitude, innovation = self._sizes
+        grown = amplitude + self._period * self._rate(amplitude, innovation)
+        least = min(self._settings.least_mm / 1e3, self._most)
+        self._sizes[0] = min(max(grown, least), self._most)
+
+    def _rate(self, amplitude: float, innovation: float) -> float:
+        """Return by how much the amplitude [m] grows [m/s]."""
+        s, excess = self._settings, innovation - self._settings.threshold_mm / 1e3
+        if excess > 0.0 and amplitude < self._start:
+            return s.growth_1_s * excess
+        missed = 1.0 - self.reach / s.reach
+        if missed > 0.0 and self._reach.tells:
+            self._woken = True
+            return s.spread_1_s * missed * amplitude
+        return -amplitude / (s.release_s if self._woken else s.settle_s)
+
+    def _surprise(self, position: Array) -> None:
+        """Compare the end position (3,) [m] with the one expected a period before."""
+        if not self._expects:
             self._position[:] = position
             return
         s = self._settings
@@ -124,14 +165,7 @@ class Dither:
         self._position[:] = position
         size = float(np.linalg.norm(np.mean(self._errors, axis=0)))
         size = max(size - s.motion_part * float(np.linalg.norm(np.mean(self._motions, axis=0))), 0.0)
-        amplitude, innovation = self._sizes
-        innovation += self._blend * (min(size, s.outlier_mm / 1e3) - innovation)
-        excess = innovation - s.threshold_mm / 1e3
-        self._woken = self._woken or excess > 0.0
-        decay = s.release_s if self._woken else s.settle_s
-        rate = s.growth_1_s * excess if excess > 0.0 else -amplitude / decay
-        grown = min(max(amplitude + self._period * rate, s.least_mm / 1e3), s.most_mm / 1e3)
-        self._sizes[:] = grown, innovation
+        self._sizes[1] += self._blend * (min(size, s.outlier_mm / 1e3) - self._sizes[1])
 
     def expect(self, position: Array | None) -> None:
         """Take the end position (3,) [m] that is expected one period from now; None if nothing is."""
@@ -151,6 +185,6 @@ class Dither:
         return np.asarray(moved / self._period)
 
 
-def _start(settings: DitherSettings) -> float:
-    """Return the amplitude at the start [m]."""
-    return max(settings.least_mm, min(settings.start_mm, settings.most_mm)) / 1e3
+def _start(settings: DitherSettings, most: float) -> float:
+    """Return the amplitude at the start [m], given the largest one [m]."""
+    return min(max(settings.least_mm, settings.start_mm) / 1e3, most)

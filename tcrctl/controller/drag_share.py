@@ -25,7 +25,7 @@ SLOW_S: Final = 1.0
 #: Time constant with which the past is forgotten [s].
 FORGET_S: Final = 10.0
 #: s² is so much, for a second [m2].
-DOUBT: Final = 2e-8
+DOUBT: Final = 5e-7
 #: κ_max: three times usual friction.
 MOST: Final = 3.0
 

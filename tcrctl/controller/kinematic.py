@@ -16,7 +16,7 @@ import numpy as np
 
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.plan import Plan, Situation
-from tcrctl.controller.settings import KinematicSettings, SlackGuard, speed_limit
+from tcrctl.controller.settings import KinematicSettings, SlackGuard
 from tcrctl.memory import Kept
 from tcrctl.robot.equations import make_workspace
 from tcrctl.robot.equilibrium import static_load
@@ -108,7 +108,7 @@ class Kinematic:
             reason = "the model has no stable equilibrium at the present drives"
             return Plan(np.zeros_like(drive), tension, found.iterations, found.residual, reason=reason)
         rest, gain = static_outputs(robot.model, self._work, self._at, robot.tip)
-        speed = at.within(self._shortened(self._rates(at, rest[POSE_ROWS:], gain)))
+        speed = at.within(_shortened(self._rates(at, rest[POSE_ROWS:], gain), float(np.max(at.high))))
         tension = rest[POSE_ROWS:] + self._settings.period_s * (gain[POSE_ROWS:] @ speed)
         return Plan(speed, tension, found.iterations, found.residual)
 
@@ -128,8 +128,8 @@ class Kinematic:
             speed = speed + free_rates(J, gain[POSE_ROWS:], guard.gain_1_s * (guard.reference_n - tension))
         return speed
 
-    def _shortened(self, speed: Array) -> Array:
-        """Return the speeds shortened to the speed limit, which keeps their direction."""
-        fastest = float(np.max(np.abs(speed)))
-        limit = speed_limit(self._settings)
-        return speed * min(1.0, limit / fastest) if fastest > 0.0 else speed
+
+def _shortened(speed: Array, limit: float) -> Array:
+    """Return the speeds (m,) shortened to the speed limit, both [m/s], which keeps their direction."""
+    fastest = float(np.max(np.abs(speed)))
+    return speed * min(1.0, limit / fastest) if fastest > 0.0 else speed

@@ -200,7 +200,7 @@ class MultiStep:
             at, still, still.copy(), basis, no_drag(robot.model), _friction(robot), nothing_known()
         )
         self._solved = False
-        self._fresh = settings.offset is not None and settings.offset.from_start
+        self._fresh = int(settings.offset is not None and settings.offset.from_start)
         self._gap = TensionGap(settings.tension_gap, period, robot.n_cables)
 
     def sharpen(self) -> None:
@@ -234,14 +234,14 @@ class MultiStep:
         tuning = self._tuning._replace(
             turn=turn(self._turn, at.dither.amplitude), drives=DriveLag(estimate.lag, self._dead_time)
         )
-        if self._fresh:  # the robot rests: all of its deviation is offset
-            memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0)
+        if self._fresh > 0:  # the robot rests: all of its deviation is offset, on the mean
+            memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0 / self._fresh, turn=0.0)
         outcome, stable, free, gain = forecast(
             robot.model, self._load, self._work, memory, now, self.grid, robot.tip, tuning
         )
         if outcome.converged:
             free[:, POSE_ROWS:] -= self._gap.lasting(estimate.tension - self._work.tension)
-            self._fresh = False
+            self._fresh = self._fresh + 1 if self._fresh and at.settling else 0
         good, self._solved = outcome.converged and stable, outcome.converged
         reason = "" if good else "the model has no stable equilibrium at the present drives"
         at_rest = None

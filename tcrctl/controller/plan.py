@@ -28,6 +28,7 @@ class Situation:
         high: Upper limits (blocks * m,) [m/s].
         doubt: Empty, or why the estimate is not usable: whatever is planned, the drives will be held.
         dither: What the dither does.
+        settling: The run has just begun: whatever is planned, only the dither moves the drives.
     """
 
     estimate: Estimate
@@ -41,6 +42,7 @@ class Situation:
     high: Array
     doubt: str
     dither: Dithered
+    settling: bool = False
 
     def within(self, speed: Array) -> Array:
         """Return speeds of the coming period (m,) [m/s], each cut off at its limits."""

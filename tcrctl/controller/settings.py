@@ -56,7 +56,7 @@ class IntegralSettings(Settings):
 
 
 class DitherSettings(Settings):
-    """Fast small motion of the drives against friction; as large as the prediction is wrong."""
+    """Fast small motion of the drives against friction; as large as it takes to get along the robot."""
 
     frequency_hz: float = quantity("Hz", "frequency of the triangle wave", 5.0, gt=0, le=100)
     least_mm: float = quantity("mm", "smallest amplitude, there from the start", 0.0, ge=0, le=5)
@@ -66,14 +66,25 @@ class DitherSettings(Settings):
         "1", "part of the motion expected by which a model without friction is wrong, too", 0.5, ge=0, le=1
     )
     growth_1_s: float = quantity(
-        "1/s", "growth of the amplitude by innovation beyond the threshold", 30.0, gt=0
+        "1/s", "growth of a sleeping dither by innovation beyond the threshold", 30.0, gt=0
     )
-    release_s: float = quantity("s", "time constant of its decay", 100.0, gt=0)
+    reach: float = quantity("1", "part of the wave that has to get along the robot", 0.6, gt=0, lt=1)
+    spread_1_s: float = quantity(
+        "1/s", "growth of the amplitude where nothing of the wave arrives", 8.0, gt=0
+    )
+    speed_part: float = quantity("1", "part of the speed limit that the wave may take", 0.4, gt=0, le=0.8)
+    release_s: float = quantity("s", "time constant of its decay where more arrives than has to", 20.0, gt=0)
     filter_s: float = quantity("s", "time constant of the innovation's size", 0.1, gt=0)
     outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
-    start_mm: float = quantity("mm", "amplitude at the start, before anything is known", 0.3, ge=0, le=5)
+    start_mm: float = quantity(
+        "mm",
+        "amplitude at the start, and with which a sleeping dither tries whether cables rub",
+        0.3,
+        ge=0,
+        le=5,
+    )
     settle_s: float = quantity(
-        "s", "time constant of its decay until the threshold is passed for the first time", 1.5, gt=0
+        "s", "time constant of its decay until part of the wave is missed for the first time", 1.5, gt=0
     )
     speed_change: float = quantity(
         "s2/m2",
@@ -135,6 +146,11 @@ class ControllerSection(Settings):
         return KnownDrives()
 
     @property
+    def settling(self) -> float:
+        """Time at the start in which only the dither moves the drives [s]."""
+        return 0.0
+
+    @property
     def floor_n(self) -> float | None:
         """Lowest tension wanted [N]; None if none is."""
         return None
@@ -175,6 +191,13 @@ class IocSettings(ControllerSection):
         default=DitherSettings(), description="keeps cables from sticking in their holes, or off"
     )
     drives: KnownDrives = Field(default=KnownDrives(), description="what is known of the drives")
+    settle_s: float = quantity(
+        "s",
+        "time at the start in which only the dither moves the drives: estimator and dither find out what the "
+        "robot is like",
+        1.0,
+        ge=0,
+    )
     speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
 
     @model_validator(mode="after")
@@ -206,6 +229,11 @@ class IocSettings(ControllerSection):
     def tracks(self) -> Literal["position", "pose"]:
         """What of the end is fed back."""
         return self.output
+
+    @property
+    def settling(self) -> float:
+        """Time at the start in which only the dither moves the drives [s]."""
+        return self.settle_s
 
     @property
     def floor_n(self) -> float | None:

@@ -7,6 +7,7 @@ estimate -> doubt, speed and stroke limits ----------+-> planner -> plan -> limi
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
@@ -19,6 +20,10 @@ from tcrctl.controller.settings import IocSettings, KinematicSettings, shaken_in
 from tcrctl.memory import SPEED, Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
+
+
+#: A reference that moves by less until the first instant ahead stands still [m].
+STILL: Final = 1e-6
 
 
 class Shell:
@@ -41,20 +46,21 @@ class Shell:
         self._normal = robot.rest_normal if settings.output == "pose" else None
         self._speed = np.zeros(robot.n_cables)
         self._saturated = np.zeros(robot.n_cables, dtype=np.bool_)
-        self.dither = Dither(settings.shaking, settings.period_s, robot)
+        self.dither = Dither(settings.shaking, settings.period_s, robot, speed_limit(settings))
         self.ahead = planner.ahead
 
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Return the command for the coming period; the drives are held if no trustworthy one was found."""
         at = self._situation(estimate, reference)
-        self.dither.observe(at.outputs[:3])
+        self.dither.observe(at.outputs[:3], estimate)
+        reserve = self.dither.fastest
         plan = self._planner.plan(at)
         reason = at.doubt or plan.reason
-        self._speed = np.zeros(self._robot.n_cables) if reason else at.within(plan.speed)
-        self.dither.expect(None if reason else plan.expected)
-        shaken = self.dither.runs and not reason
-        speed = at.within(self._speed + self.dither.speed()) if shaken else self._speed
-        limit = speed_limit(self._settings)
+        rests = bool(reason) or at.settling
+        self._speed = np.zeros(self._robot.n_cables) if rests else at.within(plan.speed)
+        self.dither.expect(None if rests else plan.expected)
+        speed = self._speed if reason else self._shaken(estimate)
+        limit = speed_limit(self._settings) - reserve
         self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
         info = ControlInfo(
             converged=not reason,
@@ -69,6 +75,13 @@ class Shell:
         )
         return Command(speed, estimate.drive + self._settings.period_s * speed), info
 
+    def _shaken(self, estimate: Estimate) -> Array:
+        """Return the planned speeds with those of the dither, within all limits (m,) [m/s]."""
+        if not self.dither.runs:
+            return self._speed
+        low, high = input_limits(self._settings, self._robot, estimate.drive, 1)
+        return np.asarray(np.clip(self._speed + self.dither.speed(), low, high))
+
     def _situation(self, estimate: Estimate, reference: Reference) -> Situation:
         """Move the integral action on, and gather what the planner is told."""
         planner = self._planner
@@ -76,10 +89,12 @@ class Shell:
         now = outputs(estimate, age, self._robot)
         error = pose_error(reference, now[:3], now[3:6])
         self._normal = now[3:6].copy() if self._settings.output == "pose" else None
-        stands = planner.anti_windup and bool(self._saturated.any())
+        settling = reference.t < self._settings.settling and _rests(reference)
+        stands = settling or (planner.anti_windup and bool(self._saturated.any()))
         gain = 1.0 + self.dither.now.awake * (self._shaken_integral - 1.0)
         shift = self._integral.update(error, stands, gain)
-        low, high = input_limits(self._settings, self._robot, estimate.drive, planner.blocks)
+        reserve = self.dither.fastest
+        low, high = input_limits(self._settings, self._robot, estimate.drive, planner.blocks, reserve)
         return Situation(
             estimate=estimate,
             reference=reference,
@@ -92,6 +107,7 @@ class Shell:
             high=high,
             doubt=_doubt(estimate),
             dither=self.dither.now,
+            settling=settling,
         )
 
     def sharpen(self) -> None:
@@ -111,6 +127,12 @@ class Shell:
     def inner_map(self) -> InnerMap | None:
         """Return the planner's iteration."""
         return self._planner.inner_map()
+
+
+def _rests(reference: Reference) -> bool:
+    """Return whether the reference stands still for the first instant that the planner looks at."""
+    ahead = reference.ahead_position
+    return ahead is None or bool(np.abs(ahead[0] - reference.position).max() < STILL)
 
 
 def _doubt(estimate: Estimate) -> str:

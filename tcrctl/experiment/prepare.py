@@ -222,7 +222,8 @@ def build_parts(experiment: Experiment, plant: Plant, state: TrueState | None) -
     found = measured_pose(plant, robot, calibration)
     if found is not None:
         offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))
-        trajectory = StartBlend(trajectory, *found, spec.start.blend_s, spec.start.approach)
+        rest = spec.controller.settling
+        trajectory = StartBlend(trajectory, *found, spec.start.blend_s, spec.start.approach, rest)
     parts = Parts(
         trajectory=trajectory,
         plant=plant,

@@ -107,7 +107,7 @@ def run_experiment(
             folder = make_run_folder(out, experiment.spec.name)
             log = _open_log(experiment, folder, realtime=realtime, tap=tap)
             journal.attach(log.event)
-            approach = parts.trajectory.duration - experiment.trajectory.duration
+            approach = getattr(parts.trajectory, "approach", 0.0)
             journal.report("start", *_start_message(start_offset, approach))
         except BaseException:
             plant.close()

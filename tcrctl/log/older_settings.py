@@ -52,7 +52,7 @@ def _nested(controller: dict[str, Any]) -> dict[str, Any]:
 
 def _without_news(controller: dict[str, Any]) -> dict[str, Any]:
     """Return a controller that does without what it did not have when it ran, and has by default now."""
-    found = {"dither": "off", "drives": {"lag_s": 0.0}, **controller}
+    found = {"dither": "off", "drives": {"lag_s": 0.0}, "settle_s": 0.0, **controller}
     prediction = controller.get("prediction", "multi_step")
     dynamic = controller.get("model", "dynamic") == "dynamic"
     if isinstance(prediction, str):

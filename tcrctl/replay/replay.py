@@ -135,8 +135,8 @@ class _Replay:
             return self._plant
         trajectory = make_trajectory(recorded, self.robot)
         normal = self.robot.rest_normal if first.reference.normal is None else first.reference.normal
-        start = recorded.start
-        return StartBlend(trajectory, first.reference.position, normal, start.blend_s, start.approach)
+        start, rest = recorded.start, recorded.controller.settling
+        return StartBlend(trajectory, first.reference.position, normal, start.blend_s, start.approach, rest)
 
     def run(self, record: Record | None, progress: Progress) -> RecordingEndedError | str:
         """Replay to the end of the window or of what there is; return why it ended."""

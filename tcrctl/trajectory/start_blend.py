@@ -31,12 +31,19 @@ class StartBlend:
     has left it, first goes to the start of the trajectory, as slowly as that.
 
     Attributes:
-        approach: Time until the trajectory begins [s]; 0 if the robot is near enough.
-        duration: That of the approach and the trajectory [s].
+        approach: Time from rest until the trajectory begins [s]; 0 if the robot is near enough.
+        rest: Time in which the robot is left where it is before that [s].
+        duration: That of rest, approach and the trajectory [s].
     """
 
     def __init__(
-        self, trajectory: Trajectory, position: Array, normal: Array, blend: float, speed: float = np.inf
+        self,
+        trajectory: Trajectory,
+        position: Array,
+        normal: Array,
+        blend: float,
+        speed: float = np.inf,
+        rest: float = 0.0,
     ) -> None:
         """Take up a trajectory.
 
@@ -46,8 +53,11 @@ class StartBlend:
             normal: Its unit end normal (3,); not used if the trajectory leaves the orientation free.
             blend: Time in which the offset fades out [s]; 0: no offset, the run begins with a step.
             speed: Largest speed at which the offset may fade out while the trajectory goes on [m/s].
+            rest: Time in which the robot is left where it is before anything begins [s]; it counts only if there
+                is a blend.
         """
         self._trajectory = trajectory
+        self.rest = rest if blend > 0.0 else 0.0
         zero = np.zeros(1)
         self._offset = position - trajectory.position(zero)[0]
         needed = STEEPEST * float(np.linalg.norm(self._offset)) / speed
@@ -60,8 +70,8 @@ class StartBlend:
 
     @property
     def duration(self) -> float:
-        """Duration of the approach and the trajectory [s]."""
-        return self.approach + self._trajectory.duration
+        """Duration of rest, approach and the trajectory [s]."""
+        return self.rest + self.approach + self._trajectory.duration
 
     def position(self, t: Array) -> Array:
         """Return end positions at times t (n,) [s] as (n, 3) [m]."""
@@ -79,11 +89,12 @@ class StartBlend:
 
     def _since(self, t: Array) -> Array:
         """Return times of the trajectory at times t (n,) of the run."""
-        return np.maximum(t - self.approach, 0.0) if self.approach else t
+        before = self.rest + self.approach
+        return np.maximum(t - before, 0.0) if before else t
 
     def _left(self, t: Array) -> Array:
         """Return the part of the offset that is left at times t (n,)."""
-        return fade_out(t / self._fading) if self._fading > 0.0 else np.zeros(t.shape)
+        return fade_out((t - self.rest) / self._fading) if self._fading > 0.0 else np.zeros(t.shape)
 
 
 def _turned(vectors: Array, turns: Array) -> Array:
