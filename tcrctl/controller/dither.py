@@ -8,9 +8,10 @@ mean only 2/π asin(U / V) of its friction, with mean speed U and dither speed V
     A grows while less of the wave than ``reach`` gets along the robot, and shrinks while more does
 
 Where cables rub the first holes use a small wave up (controller.wave_reach). A robot without friction lets it pass,
-so its drives are soon left in peace. A dither that sleeps is woken, as large as at the start, by the innovation: the
-measured end position against the one predicted a period before, averaged over a whole wave so that the dither's own
-trace is not in it, less a part of the motion that was predicted: a wrong model misses by that, too. [ADC94]
+so its drives are soon left in peace. A dither that sleeps is woken, as large as at the start, by the innovation:
+the measured end position against the one predicted a period before, averaged over a whole wave so that the dither's
+own trace is not in it, less a part of the motion that was predicted: a wrong model misses by that, too. If cables
+of one length move against each other, nothing is seen of the wave, and the innovation alone lets it grow. [ADC94]
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class Dither:
     """
 
     def __init__(self, settings: DitherSettings | None, period: float, robot: Robot, limit: float) -> None:
-        """Take a ``dither:`` section, or None for none, the control period [s], the robot, the speed limit [m/s]."""
+        """Take a ``dither:`` section or None for none, the control period [s], the robot, the speed limit [m/s]."""
         self._settings = settings or DitherSettings()
         self._period = period
         self.runs = settings is not None
@@ -124,7 +125,8 @@ class Dither:
             "errors": self._errors.ravel(),  # a view
             "motions": self._motions.ravel(),
         }
-        return {f"dither_{name}": Kept(values, POSITION) for name, values in kept.items()}
+        all_kept = {name: Kept(values, POSITION) for name, values in kept.items()} | self._reach.memory()
+        return {f"dither_{name}": values for name, values in all_kept.items()}
 
     def observe(self, position: Array, estimate: Estimate) -> None:
         """Look at what has become of the wave and of the expected motion, and adapt the amplitude.
@@ -146,8 +148,11 @@ class Dither:
     def _rate(self, amplitude: float, innovation: float) -> float:
         """Return by how much the amplitude [m] grows [m/s]."""
         s, excess = self._settings, innovation - self._settings.threshold_mm / 1e3
-        if excess > 0.0 and amplitude < self._start:
+        if excess > 0.0 and not self._reach.sees:
+            self._woken = True
             return s.growth_1_s * excess
+        if excess > 0.0 and amplitude < self._start:
+            return min(s.growth_1_s * excess, (self._start - amplitude) / self._period)
         missed = 1.0 - self.reach / s.reach
         if missed > 0.0 and self._reach.tells:
             self._woken = True

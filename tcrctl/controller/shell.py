@@ -21,7 +21,6 @@ from tcrctl.memory import SPEED, Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
-
 #: A reference that moves by less until the first instant ahead stands still [m].
 STILL: Final = 1e-6
 

@@ -1,7 +1,9 @@
 """Markers that cameras lose for a moment, filled in where they must be.
 
 Every marker sits about a millimetre beside its node. A ring that loses one of three for a frame would seem to jump
-by that, and the end normal with it; so a lost marker is put on its node, as far beside it as it was.
+by that, and the end normal with it; so a lost marker is put on its node, as far beside it as it was. A ring that
+is lost whole would let go of all that a wrong model has stored in the module above, and jump by millimetres; for a
+moment it is taken to move on as it did.
 """
 
 from __future__ import annotations
@@ -14,10 +16,12 @@ from numpy.typing import NDArray
 
 from tcrctl.signals import Array, Measurement
 
-#: Markers of one ring. A ring that is lost whole is not filled in: nothing would hold it where it is.
+#: Markers of one ring.
 RING: Final = 3
 #: A lost marker is filled in for so long [s]; then it counts as not seen.
 LONGEST: Final = 0.5
+#: The same for the markers of a ring that is lost whole: nothing but its speed says where it is.
+LONGEST_RING: Final = 0.2
 #: Time constant of the mean place of a marker beside its node [s].
 FILTER: Final = 1.0
 
@@ -40,7 +44,8 @@ class LostMarkers:
         """
         self._missing = np.where(measured.valid, 0.0, self._missing + self._period)
         of_seen_ring = np.repeat(measured.valid.reshape(-1, RING).any(axis=1), RING)
-        fill = (self._missing > 0.0) & (self._missing < LONGEST) & self._known & of_seen_ring
+        longest = np.where(of_seen_ring, LONGEST, LONGEST_RING)
+        fill = (self._missing > 0.0) & (self._missing < longest) & self._known
         if not fill.any():
             return measured
         nodes = np.where(fill[:, None], expected + self._beside, measured.nodes)

@@ -24,8 +24,12 @@ WAVE = 20  # periods of a wave of 5 Hz
 ALWAYS = {"least_mm": 1.5, "most_mm": 1.5}
 
 
-def running(robot, period=PERIOD, **settings):
-    return Dither(DitherSettings(**settings), period, robot)
+FAST = 1.0
+"""A speed limit that leaves room for every wave [m/s]."""
+
+
+def running(robot, period=PERIOD, limit=FAST, **settings):
+    return Dither(DitherSettings(**settings), period, robot, limit)
 
 
 def places(dither, count):
@@ -33,15 +37,25 @@ def places(dither, count):
     return PERIOD * np.cumsum([dither.speed() for _ in range(count)], axis=0)
 
 
-def watch(dither, errors):
-    """Tell an end that is beside where it was expected by ``errors`` (n, 3) [m]; returns the amplitudes [m]."""
+def watch(dither, errors, robot, arrives=1.0):
+    """Tell an end that is beside where it was expected by ``errors`` (n, 3) [m]; returns the amplitudes [m].
+
+    Of the wave, so much arrives in the robot.
+    """
     found = []
     for error in errors:
         dither.expect(np.zeros(3))
         dither.speed()
-        dither.observe(np.asarray(error))
+        dither.observe(np.asarray(error), waved(robot, dither.now.place, arrives))
         found.append(dither.amplitude)
     return np.array(found)
+
+
+def waved(robot, place, arrives=1.0):
+    """A robot at rest but for the part that arrives of what the drives do."""
+    q = robot.rest.q.copy()
+    q[q.size - robot.rest.gain.shape[0] :] += arrives * robot.rest.gain @ place
+    return replace(resting(robot, place), q=q)
 
 
 def test_the_signs_of_the_six_cables_alternate(tcr700):
@@ -81,29 +95,58 @@ def test_the_wave_has_the_asked_amplitude_and_frequency_and_no_mean(tcr700):
     assert np.count_nonzero(np.diff(np.sign(speed))) == 12
 
 
-def test_it_grows_while_the_end_goes_elsewhere_and_releases_slowly(tcr700):
-    dither = running(tcr700, release_s=2.0, growth_1_s=5.0, start_mm=0.0)
-    away = np.tile([2e-3, 0.0, 0.0], (300, 1))
-    grown = watch(dither, away)
-    assert np.all(np.diff(grown) >= 0.0)
+STILL = np.zeros((400, 3))
+
+
+def test_it_grows_while_the_wave_does_not_arrive_and_releases_slowly(tcr700):
+    dither = running(tcr700, release_s=2.0)
+    grown = watch(dither, STILL, tcr700, arrives=0.2)
+    assert np.all(np.diff(grown[2 * WAVE :]) >= 0.0)
     assert grown[-1] == pytest.approx(2e-3)  # most_mm
-    released = watch(dither, np.zeros((1000, 3)))
-    assert np.all(np.diff(released[400:]) < 0.0)
-    ratio = released[-1] / released[-201]  # 2 s later
-    assert ratio == pytest.approx(np.exp(-1.0), rel=0.02)
+    released = watch(dither, STILL, tcr700)
+    assert released[-1] / released[-201] == pytest.approx(np.exp(-1.0), rel=0.02)  # in 2 s
+
+
+def test_it_grows_no_more_where_enough_arrives(tcr700):
+    dither = running(tcr700, reach=0.5, start_mm=0.3)
+    assert watch(dither, STILL, tcr700, arrives=0.55).max() <= 0.3e-3
 
 
 def test_it_is_small_at_the_start_and_gone_before_long(tcr700):
     dither = running(tcr700, start_mm=0.3, settle_s=1.0)
-    found = watch(dither, np.tile([0.2e-3, 0.0, 0.0], (200, 1)))
+    found = watch(dither, np.tile([0.2e-3, 0.0, 0.0], (200, 1)), tcr700)
     np.testing.assert_allclose(found, 0.3e-3 * (1.0 - PERIOD) ** np.arange(1, 201), rtol=1e-9)
 
 
-def test_once_woken_it_is_released_slowly(tcr700):
-    dither = running(tcr700, start_mm=0.3, settle_s=0.5, release_s=50.0)
-    watch(dither, np.tile([2e-3, 0.0, 0.0], (60, 1)))
-    grown = watch(dither, np.zeros((100, 3)))[-1]
-    assert watch(dither, np.zeros((100, 3)))[-1] == pytest.approx(grown * np.exp(-1.0 / 50.0), rel=1e-3)
+def test_it_takes_its_part_of_the_speed_limit_and_no_more(tcr700):
+    dither = running(tcr700, limit=0.05, speed_part=0.4)
+    assert watch(dither, STILL, tcr700, arrives=0.0)[-1] == pytest.approx(1e-3)
+    assert dither.fastest == pytest.approx(0.02)
+    assert np.abs(np.diff(places(dither, 3 * WAVE), axis=0)).max() <= 0.02 * PERIOD * (1.0 + 1e-9)
+
+
+def test_asleep_it_is_woken_by_an_end_that_goes_elsewhere_and_stays_small_if_its_wave_arrives(tcr700):
+    dither = running(tcr700, start_mm=0.3, settle_s=0.05)
+    assert watch(dither, STILL, tcr700)[-1] < 1e-6
+    away = np.tile([2e-3, 0.0, 0.0], (200, 1))
+    assert watch(dither, away, tcr700).max() == pytest.approx(0.3e-3)
+
+
+def test_asleep_it_is_woken_by_an_end_that_goes_elsewhere_and_grows_if_its_wave_does_not_arrive(tcr700):
+    dither = running(tcr700, start_mm=0.3, settle_s=0.05)
+    watch(dither, STILL, tcr700)
+    away = np.tile([2e-3, 0.0, 0.0], (200, 1))
+    assert watch(dither, away, tcr700, arrives=0.1)[-1] == pytest.approx(2e-3)
+
+
+def test_a_wave_that_cannot_be_seen_grows_while_the_end_goes_elsewhere(tcr5x4):
+    dither = running(tcr5x4, growth_1_s=5.0, release_s=50.0, start_mm=0.0)
+    grown = watch(dither, np.tile([2e-3, 0.0, 0.0], (300, 1)), tcr5x4)
+    assert np.all(np.diff(grown) >= 0.0)
+    assert grown[-1] == pytest.approx(2e-3)  # most_mm
+    watch(dither, STILL[:50], tcr5x4)
+    released = watch(dither, STILL[:100], tcr5x4)
+    assert released[-1] / released[0] == pytest.approx(np.exp(-0.99 / 50.0), rel=1e-3)
 
 
 @pytest.mark.parametrize(("amplitude", "awake"), [(0.0, 0.0), (0.25e-3, 0.5), (0.5e-3, 1.0), (2e-3, 1.0)])
@@ -113,7 +156,7 @@ def test_it_is_awake_from_half_a_millimetre_on(amplitude, awake):
 
 def test_what_is_no_friction_leaves_it_at_rest(tcr700):
     dither = running(tcr700, start_mm=0.0)
-    assert not watch(dither, np.tile([0.2e-3, 0.0, 0.0], (500, 1))).any()
+    assert not watch(dither, np.tile([0.2e-3, 0.0, 0.0], (500, 1)), tcr700).any()
     assert not np.any(dither.speed())
 
 
@@ -121,15 +164,15 @@ def test_its_own_trace_does_not_feed_it(tcr700):
     phase = 2 * np.pi * np.arange(2000) / WAVE
     trace = 3e-3 * np.column_stack([np.sin(phase), np.cos(phase), np.sign(np.sin(phase + 0.1))])
     dither = running(tcr700)
-    watch(dither, trace[:WAVE])  # until the first wave is full
+    watch(dither, trace[:WAVE], tcr700)  # until the first wave is full
     before = dither.innovation
-    watch(dither, trace[WAVE:])
+    watch(dither, trace[WAVE:], tcr700)
     assert dither.innovation < max(0.01e-3, 1e-3 * before)
 
 
 def test_an_outlier_counts_as_much_as_it_may(tcr700):
     dither = running(tcr700, outlier_mm=1.0)
-    watch(dither, np.tile([1.0, 0.0, 0.0], (2000, 1)))
+    watch(dither, np.tile([1.0, 0.0, 0.0], (2000, 1)), tcr700)
     assert dither.innovation == pytest.approx(1e-3)
 
 
@@ -137,7 +180,7 @@ def test_an_outlier_counts_as_much_as_it_may(tcr700):
 def test_what_is_not_known_is_not_compared(tcr700, position):
     dither = running(tcr700)
     dither.expect(None if position is None else np.array(position))
-    dither.observe(np.ones(3))
+    dither.observe(np.ones(3), resting(tcr700))
     assert dither.innovation == 0.0
 
 
@@ -149,7 +192,7 @@ def test_the_smallest_amplitude_is_not_above_the_largest():
 def test_off_and_told_to_stand_still_it_moves_and_keeps_nothing(tcr700):
     told = running(tcr700, **ALWAYS)
     told.stand_still()
-    for dither in (told, Dither(None, PERIOD, tcr700)):
+    for dither in (told, Dither(None, PERIOD, tcr700, FAST)):
         assert not np.any(places(dither, WAVE))
         assert dither.memory() == {}
 
@@ -157,12 +200,12 @@ def test_off_and_told_to_stand_still_it_moves_and_keeps_nothing(tcr700):
 def test_its_memory_is_all_that_the_next_steps_depend_on(tcr700):
     """But for the phase, which is time."""
     one, other = running(tcr700, least_mm=0.5), running(tcr700, least_mm=0.5)
-    watch(one, np.tile([2e-3, 0.0, 0.0], (2 * WAVE, 1)))
-    watch(other, np.zeros((2 * WAVE, 3)))
+    watch(one, np.tile([2e-3, 0.0, 0.0], (3 * WAVE, 1)), tcr700, arrives=0.3)
+    watch(other, np.zeros((3 * WAVE, 3)), tcr700, arrives=0.5)
     for name, kept in one.memory().items():
         other.memory()[name].values[:] = kept.values
     error = np.tile([1e-3, 1e-3, 0.0], (WAVE, 1))
-    np.testing.assert_array_equal(watch(one, error), watch(other, error))
+    np.testing.assert_array_equal(watch(one, error, tcr700), watch(other, error, tcr700))
     np.testing.assert_array_equal(places(one, WAVE), places(other, WAVE))
 
 
