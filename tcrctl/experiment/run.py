@@ -42,6 +42,7 @@ from tcrctl.plant.rig.operation import Operation
 from tcrctl.robot.module import RIGID_BARS, module_of, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import StepRecord
+from tcrctl.trajectory.start_blend import StartBlend
 from tcrctl.trajectory.trajectory import Trajectory
 
 #: Points of the drawn path of the reference: as far apart in time as this [s], but no more than these.
@@ -107,7 +108,8 @@ def run_experiment(
             folder = make_run_folder(out, experiment.spec.name)
             log = _open_log(experiment, folder, realtime=realtime, tap=tap)
             journal.attach(log.event)
-            approach = getattr(parts.trajectory, "approach", 0.0)
+            started = parts.trajectory
+            approach = started.approach if isinstance(started, StartBlend) else 0.0
             journal.report("start", *_start_message(start_offset, approach))
         except BaseException:
             plant.close()
