@@ -125,8 +125,8 @@ class Dither:
             "errors": self._errors.ravel(),  # a view
             "motions": self._motions.ravel(),
         }
-        all_kept = {name: Kept(values, POSITION) for name, values in kept.items()} | self._reach.memory()
-        return {f"dither_{name}": values for name, values in all_kept.items()}
+        own = {name: Kept(values, POSITION) for name, values in kept.items()}
+        return {f"dither_{name}": values for name, values in {**own, **self._reach.memory()}.items()}
 
     def observe(self, position: Array, estimate: Estimate) -> None:
         """Look at what has become of the wave and of the expected motion, and adapt the amplitude.
