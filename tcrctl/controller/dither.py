@@ -5,13 +5,13 @@ end by millimetres, and a loop that does not know of it hunts. A cable that alwa
 mean only 2/π asin(U / V) of its friction, with mean speed U and dither speed V: a little damping, no relay.
 
     triangle wave of the drive lengths, ± A, sign +1 or -1 by cable so that forces and motions cancel
-    A grows while less of the wave than ``reach`` gets along the robot, and shrinks while more does
+    A is the largest one if cables are known to rub; it grows while the end does not go where the prediction said,
+    and shrinks slowly otherwise
 
-Where cables rub the first holes use a small wave up (controller.wave_reach). A robot without friction lets it pass,
-so its drives are soon left in peace. A dither that sleeps is woken, as large as at the start, by the innovation:
-the measured end position against the one predicted a period before, averaged over a whole wave so that the dither's
-own trace is not in it, less a part of the motion that was predicted: a wrong model misses by that, too. If cables
-of one length move against each other, nothing is seen of the wave, and the innovation alone lets it grow. [ADC94]
+While a run settles and the reference rests, a small wave with another pattern tries whether cables rub
+(controller.friction_probe). Later friction shows by the innovation: the measured end position against the one
+predicted a period before, averaged over a whole wave so that the dither's own trace is not in it, less a part of
+the motion that was predicted: a wrong model misses by that, too. A robot without friction is left in peace. [ADC94]
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from tcrctl.controller.settings import DitherSettings
-from tcrctl.controller.wave_reach import WaveReach
+from tcrctl.controller.dither_settings import DitherSettings
+from tcrctl.controller.friction_probe import FrictionProbe
 from tcrctl.memory import POSITION, Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.robot.swing import signs
@@ -66,14 +66,15 @@ class Dither:
             self._half_wave // 2
         )  # it begins halfway up, so that the mean of the first wave is zero too
         self._signs = signs(robot) if self.runs else np.zeros(robot.n_cables)
-        self._most = min(
-            self._settings.most_mm / 1e3, self._settings.speed_part * limit * self._half_wave * period / 2.0
-        )
-        self._start = _start(self._settings, self._most)
-        self._sizes = np.array([self._start if self.runs else 0.0, 0.0])
-        self._reach = WaveReach(robot, self._signs, self._half_wave)
-        self._woken = False
-        self._place = np.zeros(robot.n_cables)
+        room = self._settings.speed_part * limit * self._half_wave * period / 2.0
+        self._most = min(self._settings.most_mm / 1e3, room)
+        self._least = min(self._settings.least_mm / 1e3, self._most)
+        self._sizes = np.array([self._least if self.runs else 0.0, 0.0])
+        self._probe: FrictionProbe | None = None
+        if self.runs and 0.0 < self._settings.probe_mm > self._settings.least_mm:
+            self._probe = FrictionProbe(robot, self._half_wave, period)
+        self._probes = False
+        self._wave, self._place = 0.0, np.zeros(robot.n_cables)
         self._expects, self._expected = False, np.zeros(3)
         self._position, self._motions = np.zeros(3), np.zeros((2 * self._half_wave, 3))
         self._errors = np.zeros((2 * self._half_wave, 3))
@@ -90,9 +91,14 @@ class Dither:
         return 2.0 * self.amplitude / (self._half_wave * self._period)
 
     @property
-    def reach(self) -> float:
-        """Part of the wave that gets along the robot."""
-        return self._reach.share
+    def thrown(self) -> float | None:
+        """By how much more than without friction the probing wave has thrown the end [m]; None: not known."""
+        return None if self._probe is None else self._probe.thrown
+
+    @property
+    def rubs(self) -> bool:
+        """Whether the probing wave has told that cables rub."""
+        return self.thrown is not None and self.thrown > self._settings.rubs_mm / 1e3
 
     @property
     def now(self) -> Dithered:
@@ -108,6 +114,7 @@ class Dither:
         """Move no drive from now on: under a periodic input a loop has no equilibrium to linearise about."""
         self.runs = False
         self._sizes[:] = 0.0
+        self._wave = 0.0
         self._place[:] = 0.0
 
     def memory(self) -> Mapping[str, Kept]:
@@ -125,49 +132,50 @@ class Dither:
             "errors": self._errors.ravel(),  # a view
             "motions": self._motions.ravel(),
         }
-        own = {name: Kept(values, POSITION) for name, values in kept.items()}
-        return {f"dither_{name}": values for name, values in {**own, **self._reach.memory()}.items()}
+        return {f"dither_{name}": Kept(values, POSITION) for name, values in kept.items()}
 
-    def observe(self, position: Array, estimate: Estimate) -> None:
-        """Look at what has become of the wave and of the expected motion, and adapt the amplitude.
+    def observe(self, position: Array, estimate: Estimate, *, settling: bool = False) -> None:
+        """Look at what has become of the wave or of the expected motion, and adapt the amplitude.
 
         Args:
-            position: Measured end position (3,) [m].
-            estimate: The robot, and where its drives are.
+            position: Measured end position now (3,) [m].
+            estimate: The end when it was measured, and where the drives were.
+            settling: The reference rests, and nothing else moves the drives.
         """
-        if not (self.runs and np.isfinite(position).all() and np.isfinite(estimate.q).all()):
-            self._position[:] = position
+        if not self.runs:
             return
-        self._reach.observe(estimate.q, estimate.drive)
-        self._surprise(position)
-        amplitude, innovation = self._sizes
-        grown = amplitude + self._period * self._rate(amplitude, innovation)
-        least = min(self._settings.least_mm / 1e3, self._most)
-        self._sizes[0] = min(max(grown, least), self._most)
+        if self._probe is not None and settling and self._probe.thrown is None:
+            self._try(self._probe, estimate)
+        elif self._probes:  # it is over
+            self._probes = False
+            self._sizes[0] = self._most if self.rubs else self._least
+        elif np.isfinite(position).all():
+            self._surprise(position)
+            grown = self._sizes[0] + self._period * self._rate()
+            self._sizes[0] = min(max(grown, self._least), self._most)
+        self._position[:] = position
 
-    def _rate(self, amplitude: float, innovation: float) -> float:
-        """Return by how much the amplitude [m] grows [m/s]."""
-        s, excess = self._settings, innovation - self._settings.threshold_mm / 1e3
-        if excess > 0.0 and not self._reach.sees:
-            self._woken = True
-            return s.growth_1_s * excess
-        if excess > 0.0 and amplitude < self._start:
-            return min(s.growth_1_s * excess, (self._start - amplitude) / self._period)
-        missed = 1.0 - self.reach / s.reach
-        if missed > 0.0 and self._reach.tells:
-            self._woken = True
-            return s.spread_1_s * missed * amplitude
-        return -amplitude / (s.release_s if self._woken else s.settle_s)
+    def _try(self, probe: FrictionProbe, estimate: Estimate) -> None:
+        """Find out whether cables rub."""
+        self._probes = True
+        self._sizes[0] = min(self._settings.probe_mm / 1e3, self._most)
+        probe.observe(estimate.position, estimate.drive)
+
+    def _rate(self) -> float:
+        """Return by how much the amplitude grows [m/s]."""
+        amplitude, innovation = self._sizes
+        excess = innovation - self._settings.threshold_mm / 1e3
+        return float(
+            self._settings.growth_1_s * excess if excess > 0.0 else -amplitude / self._settings.release_s
+        )
 
     def _surprise(self, position: Array) -> None:
         """Compare the end position (3,) [m] with the one expected a period before."""
         if not self._expects:
-            self._position[:] = position
             return
         s = self._settings
         self._errors[self._step % self._errors.shape[0]] = position - self._expected
         self._motions[self._step % self._motions.shape[0]] = self._expected - self._position
-        self._position[:] = position
         size = float(np.linalg.norm(np.mean(self._errors, axis=0)))
         size = max(size - s.motion_part * float(np.linalg.norm(np.mean(self._motions, axis=0))), 0.0)
         self._sizes[1] += self._blend * (min(size, s.outlier_mm / 1e3) - self._sizes[1])
@@ -184,12 +192,9 @@ class Dither:
         up = 1.0 if (self._step // self._half_wave) % 2 == 0 else -1.0
         self._step += 1
         ramp = 2.0 * self.amplitude / self._half_wave  # way of a period
-        wanted = np.clip(self._place + up * ramp * self._signs, -self.amplitude, self.amplitude)
+        self._wave = min(max(self._wave + up * ramp, -self.amplitude), self.amplitude)
+        pattern = self._probe.pattern if self._probe is not None and self._probes else self._signs
+        wanted = self._wave * pattern
         moved = wanted - self._place
         self._place[:] = wanted
         return np.asarray(moved / self._period)
-
-
-def _start(settings: DitherSettings, most: float) -> float:
-    """Return the amplitude at the start [m], given the largest one [m]."""
-    return min(max(settings.least_mm, settings.start_mm) / 1e3, most)

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from tcrctl.config.keys import Finding
 from tcrctl.config.settings import OrOff, Settings, quantity, refuse
+from tcrctl.controller.dither_settings import DitherSettings
 from tcrctl.controller.prediction_settings import MultiStepSettings, Prediction
 
 
@@ -53,57 +54,6 @@ class IntegralSettings(Settings):
     gain_1_s: float = quantity("1/s", "integral gain", 3.0, gt=0)
     limit_mm: float = quantity("mm", "largest shift of the target position", 20.0, gt=0)
     limit_deg: float = quantity("deg", "largest tilt of the target normal; output: pose only", 10.0, gt=0)
-
-
-class DitherSettings(Settings):
-    """Fast small motion of the drives against friction; as large as it takes to get along the robot."""
-
-    frequency_hz: float = quantity("Hz", "frequency of the triangle wave", 5.0, gt=0, le=100)
-    least_mm: float = quantity("mm", "smallest amplitude, there from the start", 0.0, ge=0, le=5)
-    most_mm: float = quantity("mm", "largest amplitude", 2.0, gt=0, le=5)
-    threshold_mm: float = quantity("mm", "innovation of the end position that is not friction", 0.2, gt=0)
-    motion_part: float = quantity(
-        "1", "part of the motion expected by which a model without friction is wrong, too", 0.5, ge=0, le=1
-    )
-    growth_1_s: float = quantity(
-        "1/s", "growth of a sleeping dither by innovation beyond the threshold", 30.0, gt=0
-    )
-    reach: float = quantity("1", "part of the wave that has to get along the robot", 0.6, gt=0, lt=1)
-    spread_1_s: float = quantity(
-        "1/s", "growth of the amplitude where nothing of the wave arrives", 8.0, gt=0
-    )
-    speed_part: float = quantity("1", "part of the speed limit that the wave may take", 0.4, gt=0, le=0.8)
-    release_s: float = quantity("s", "time constant of its decay where more arrives than has to", 20.0, gt=0)
-    filter_s: float = quantity("s", "time constant of the innovation's size", 0.1, gt=0)
-    outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
-    start_mm: float = quantity(
-        "mm",
-        "amplitude at the start, and with which a sleeping dither tries whether cables rub",
-        0.3,
-        ge=0,
-        le=5,
-    )
-    settle_s: float = quantity(
-        "s", "time constant of its decay until part of the wave is missed for the first time", 1.5, gt=0
-    )
-    speed_change: float = quantity(
-        "s2/m2",
-        "weight of squared changes of drive speed while it runs, if that is the larger one",
-        3.5e3,
-        gt=0,
-    )
-    integral_gain_1_s: float = quantity(
-        "1/s", "integral gain while it runs, if that is the smaller one", 2.0, gt=0
-    )
-
-    @model_validator(mode="after")
-    def _in_order(self) -> DitherSettings:
-        refuse(self._disorder())
-        return self
-
-    def _disorder(self) -> Iterator[Finding]:
-        if self.least_mm > self.most_mm:
-            yield ("least_mm",), f"must be at most most_mm, {self.most_mm:g}, not {self.least_mm:g}"
 
 
 class KnownDrives(Settings):

@@ -51,7 +51,7 @@ class Shell:
     def control(self, estimate: Estimate, reference: Reference) -> tuple[Command, ControlInfo]:
         """Return the command for the coming period; the drives are held if no trustworthy one was found."""
         at = self._situation(estimate, reference)
-        self.dither.observe(at.outputs[:3], estimate)
+        self.dither.observe(at.outputs[:3], estimate, settling=at.settling)
         reserve = self.dither.fastest
         plan = self._planner.plan(at)
         reason = at.doubt or plan.reason

@@ -21,7 +21,7 @@ RING: Final = 3
 #: A lost marker is filled in for so long [s]; then it counts as not seen.
 LONGEST: Final = 0.5
 #: The same for the markers of a ring that is lost whole: nothing but its speed says where it is.
-LONGEST_RING: Final = 0.2
+LONGEST_RING: Final = 0.1
 #: Time constant of the mean place of a marker beside its node [s].
 FILTER: Final = 1.0
 

@@ -11,7 +11,7 @@ import pytest
 from support.closed_loop import constant, ioc, resting
 from tcrctl.controller.controller import build_controller
 from tcrctl.controller.dither import Dither, Dithered
-from tcrctl.controller.settings import DitherSettings
+from tcrctl.controller.dither_settings import DitherSettings
 from tcrctl.errors import SpecError
 from tcrctl.experiment.prepare import build_parts, build_plant, prepare
 from tcrctl.experiment.spec import load_spec
@@ -37,25 +37,27 @@ def places(dither, count):
     return PERIOD * np.cumsum([dither.speed() for _ in range(count)], axis=0)
 
 
-def watch(dither, errors, robot, arrives=1.0):
-    """Tell an end that is beside where it was expected by ``errors`` (n, 3) [m]; returns the amplitudes [m].
-
-    Of the wave, so much arrives in the robot.
-    """
+def watch(dither, errors, robot):
+    """Tell an end that is beside where it was expected by ``errors`` (n, 3) [m]; returns the amplitudes [m]."""
     found = []
     for error in errors:
         dither.expect(np.zeros(3))
         dither.speed()
-        dither.observe(np.asarray(error), waved(robot, dither.now.place, arrives))
+        dither.observe(np.asarray(error), resting(robot, dither.now.place))
         found.append(dither.amplitude)
     return np.array(found)
 
 
-def waved(robot, place, arrives=1.0):
-    """A robot at rest but for the part that arrives of what the drives do."""
-    q = robot.rest.q.copy()
-    q[q.size - robot.rest.gain.shape[0] :] += arrives * robot.rest.gain @ place
-    return replace(resting(robot, place), q=q)
+def settle(dither, robot, thrown, steps=80):
+    """Let a resting end go sideways by ``thrown`` [m/m] of what the drives do; returns the amplitudes [m]."""
+    found, still = [], resting(robot)
+    for _ in range(steps):
+        dither.speed()
+        drive = dither.now.place
+        end = still.position + thrown * np.array([0.0, drive[0], 0.0])
+        dither.observe(end, replace(still, position=end, drive=drive), settling=True)
+        found.append(dither.amplitude)
+    return np.array(found)
 
 
 def test_the_signs_of_the_six_cables_alternate(tcr700):
@@ -95,58 +97,59 @@ def test_the_wave_has_the_asked_amplitude_and_frequency_and_no_mean(tcr700):
     assert np.count_nonzero(np.diff(np.sign(speed))) == 12
 
 
-STILL = np.zeros((400, 3))
+PROBED = 3 * WAVE  # periods until two waves have told
 
 
-def test_it_grows_while_the_wave_does_not_arrive_and_releases_slowly(tcr700):
-    dither = running(tcr700, release_s=2.0)
-    grown = watch(dither, STILL, tcr700, arrives=0.2)
-    assert np.all(np.diff(grown[2 * WAVE :]) >= 0.0)
-    assert grown[-1] == pytest.approx(2e-3)  # most_mm
-    released = watch(dither, STILL, tcr700)
-    assert released[-1] / released[-201] == pytest.approx(np.exp(-1.0), rel=0.02)  # in 2 s
+def test_an_end_that_is_thrown_while_it_settles_calls_for_all_of_the_dither(tcr700):
+    found = settle(running(tcr700), tcr700, thrown=2.0)
+    np.testing.assert_allclose(found[:PROBED], 0.2e-3)  # probe_mm
+    np.testing.assert_allclose(found[PROBED:], 2e-3, rtol=0.01)  # most_mm
 
 
-def test_it_grows_no_more_where_enough_arrives(tcr700):
-    dither = running(tcr700, reach=0.5, start_mm=0.3)
-    assert watch(dither, STILL, tcr700, arrives=0.55).max() <= 0.3e-3
+def test_an_end_that_is_not_thrown_is_left_in_peace(tcr700):
+    dither = running(tcr700)
+    assert settle(dither, tcr700, thrown=0.3)[-1] == 0.0
+    assert not dither.rubs
+    dither.speed()
+    assert not np.any(places(dither, WAVE))
 
 
-def test_it_is_small_at_the_start_and_gone_before_long(tcr700):
-    dither = running(tcr700, start_mm=0.3, settle_s=1.0)
-    found = watch(dither, np.tile([0.2e-3, 0.0, 0.0], (200, 1)), tcr700)
-    np.testing.assert_allclose(found, 0.3e-3 * (1.0 - PERIOD) ** np.arange(1, 201), rtol=1e-9)
+def test_the_probing_wave_has_the_pattern_of_the_probe_and_no_mean(tcr700):
+    dither, places_of = running(tcr700), []
+    for _ in range(2 * WAVE):
+        dither.speed()
+        dither.observe(np.zeros(3), resting(tcr700), settling=True)
+        places_of.append(dither.now.place)
+    found = np.array(places_of)[WAVE:]
+    pattern = dither.now.place / dither.now.place[0]
+    np.testing.assert_allclose(found, np.outer(found[:, 0], pattern), atol=1e-12)
+    assert np.abs(found.sum(axis=1)).max() < 1e-5  # no cable without one that gives way
+    np.testing.assert_allclose(found.mean(axis=0), 0.0, atol=1e-12)
+
+
+def test_a_dither_that_runs_anyway_does_not_probe(tcr700):
+    found = settle(running(tcr700, **ALWAYS), tcr700, thrown=2.0)
+    np.testing.assert_allclose(found, 1.5e-3)
 
 
 def test_it_takes_its_part_of_the_speed_limit_and_no_more(tcr700):
     dither = running(tcr700, limit=0.05, speed_part=0.4)
-    assert watch(dither, STILL, tcr700, arrives=0.0)[-1] == pytest.approx(1e-3)
-    assert dither.fastest == pytest.approx(0.02)
+    assert settle(dither, tcr700, thrown=2.0)[PROBED] == pytest.approx(1e-3)
+    assert dither.fastest == pytest.approx(0.02, rel=0.01)
     assert np.abs(np.diff(places(dither, 3 * WAVE), axis=0)).max() <= 0.02 * PERIOD * (1.0 + 1e-9)
 
 
-def test_asleep_it_is_woken_by_an_end_that_goes_elsewhere_and_stays_small_if_its_wave_arrives(tcr700):
-    dither = running(tcr700, start_mm=0.3, settle_s=0.05)
-    assert watch(dither, STILL, tcr700)[-1] < 1e-6
-    away = np.tile([2e-3, 0.0, 0.0], (200, 1))
-    assert watch(dither, away, tcr700).max() == pytest.approx(0.3e-3)
-
-
-def test_asleep_it_is_woken_by_an_end_that_goes_elsewhere_and_grows_if_its_wave_does_not_arrive(tcr700):
-    dither = running(tcr700, start_mm=0.3, settle_s=0.05)
-    watch(dither, STILL, tcr700)
-    away = np.tile([2e-3, 0.0, 0.0], (200, 1))
-    assert watch(dither, away, tcr700, arrives=0.1)[-1] == pytest.approx(2e-3)
-
-
-def test_a_wave_that_cannot_be_seen_grows_while_the_end_goes_elsewhere(tcr5x4):
-    dither = running(tcr5x4, growth_1_s=5.0, release_s=50.0, start_mm=0.0)
-    grown = watch(dither, np.tile([2e-3, 0.0, 0.0], (300, 1)), tcr5x4)
+@pytest.mark.parametrize("robot", ["tcr700", "tcr5x4"])
+def test_it_grows_while_the_end_goes_elsewhere_and_releases_slowly(robot, request):
+    robot = request.getfixturevalue(robot)
+    dither = running(robot, release_s=2.0, growth_1_s=5.0)
+    away = np.tile([2e-3, 0.0, 0.0], (300, 1))
+    grown = watch(dither, away, robot)
     assert np.all(np.diff(grown) >= 0.0)
     assert grown[-1] == pytest.approx(2e-3)  # most_mm
-    watch(dither, STILL[:50], tcr5x4)
-    released = watch(dither, STILL[:100], tcr5x4)
-    assert released[-1] / released[0] == pytest.approx(np.exp(-0.99 / 50.0), rel=1e-3)
+    released = watch(dither, np.zeros((1000, 3)), robot)
+    assert np.all(np.diff(released[400:]) < 0.0)
+    assert released[-1] / released[-201] == pytest.approx(np.exp(-1.0), rel=0.02)  # in 2 s
 
 
 @pytest.mark.parametrize(("amplitude", "awake"), [(0.0, 0.0), (0.25e-3, 0.5), (0.5e-3, 1.0), (2e-3, 1.0)])
@@ -155,7 +158,7 @@ def test_it_is_awake_from_half_a_millimetre_on(amplitude, awake):
 
 
 def test_what_is_no_friction_leaves_it_at_rest(tcr700):
-    dither = running(tcr700, start_mm=0.0)
+    dither = running(tcr700)
     assert not watch(dither, np.tile([0.2e-3, 0.0, 0.0], (500, 1)), tcr700).any()
     assert not np.any(dither.speed())
 
@@ -200,8 +203,8 @@ def test_off_and_told_to_stand_still_it_moves_and_keeps_nothing(tcr700):
 def test_its_memory_is_all_that_the_next_steps_depend_on(tcr700):
     """But for the phase, which is time."""
     one, other = running(tcr700, least_mm=0.5), running(tcr700, least_mm=0.5)
-    watch(one, np.tile([2e-3, 0.0, 0.0], (3 * WAVE, 1)), tcr700, arrives=0.3)
-    watch(other, np.zeros((3 * WAVE, 3)), tcr700, arrives=0.5)
+    watch(one, np.tile([2e-3, 0.0, 0.0], (3 * WAVE, 1)), tcr700)
+    watch(other, np.zeros((3 * WAVE, 3)), tcr700)
     for name, kept in one.memory().items():
         other.memory()[name].values[:] = kept.values
     error = np.tile([1e-3, 1e-3, 0.0], (WAVE, 1))

@@ -33,7 +33,7 @@ from tcrctl.replay.result import Tolerance, Window
 pytestmark = pytest.mark.slow
 
 VARIANTS = {
-    "full": ("controller.dither.start_mm=0",),  # W is the controller's own from the first step on
+    "full": ("controller.dither.probe_mm=0",),  # W is the controller's own from the first step on
     "often_flushed": ("log.flush_steps=10", "log.flush_s=0.1"),
     "lean": ("log.full_state_s=0.5",),
     "literal": ("controller.prediction=literal", "controller.integral=off"),

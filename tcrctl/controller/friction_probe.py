@@ -1,0 +1,133 @@
+"""Finds out before a run whether cables rub in their holes: by how far a small sideways wave throws the end.
+
+A cable that is moved where it rubs pulls harder near the base and bends the base first, and the long lever throws
+the end sideways at once. Without friction the end, slow as it is, hardly answers to a quick wave of the drives.
+With second differences x' = x(t) - 2 x(t - T/2) + x(t - T), which take out what is constant or changes steadily,
+
+    P = Σ p' e^(-iΩt),   Y = Σ y' e^(-iΩt)  over a wave,     e = |Y| - Y_0 |P|
+
+p the drives along the pattern, y the end, Y_0 the largest |Y| / |P| of frictionless robots whose modes are up to a
+fifth slower or faster than the model's. So e is at most about 0 however wrong masses, springs and cameras are, and
+more where cables rub. The mean of two waves counts.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from tcrctl.robot import modes, pose
+from tcrctl.robot.module import FIXED
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+
+#: Modes with which the answer of the model is found; what is faster follows at once.
+MODES: Final = 12
+#: How much faster or slower than the model's the modes may be.
+WRONG: Final = np.linspace(0.8, 1.2, 9)
+#: Amplitude of a wave of the drives that is too small to tell [m].
+FAINT: Final = 2e-5
+#: Waves that have to tell the same.
+ENOUGH: Final = 2
+#: Steps of a period in which the model's answer is integrated.
+STEPS: Final = 20
+
+
+class FrictionProbe:
+    """Finds e of one robot.
+
+    Attributes:
+        pattern: How far each drive goes, the farthest by 1 (m,): the longest cables, as they move the end along x.
+        frictionless: Y_0 [m/m].
+    """
+
+    def __init__(self, robot: Robot, half_wave: int, period: float) -> None:
+        """Take the robot, half a wave in control periods, and the control period [s]."""
+        self.pattern = _pattern(robot)
+        self._along = self.pattern / (self.pattern @ self.pattern)
+        self._half = half_wave
+        self.frictionless = max(_answer(robot, self.pattern, half_wave, period, faster) for faster in WRONG)
+        self._past: list[Array] = []
+        self._thrown: list[float] = []
+
+    @property
+    def thrown(self) -> float | None:
+        """e [m]; None as long as it is not known."""
+        return float(np.mean(self._thrown)) if len(self._thrown) >= ENOUGH else None
+
+    def observe(self, position: Array, drive: Array) -> None:
+        """Take the end position (3,) [m] and the drives at the same time (m,) [m], step by step."""
+        self._past.append(np.array([self._along @ drive, *position]))
+        wave = 2 * self._half
+        if len(self._past) >= 2 * wave and len(self._past) % wave == 0:
+            self._judge(np.array(self._past[-2 * wave :]))
+
+    def _judge(self, seen: Array) -> None:
+        """Find e of two waves of drive and end (2 wave, 4) [m]."""
+        size = swing(seen, self._half)
+        if np.isfinite(size).all() and size[0] > FAINT:
+            self._thrown.append(float(np.linalg.norm(size[1:])) - self.frictionless * float(size[0]))
+
+
+def swing(seen: Array, half: int) -> Array:
+    """Return the amplitudes (n,) of a wave of ``2 half`` samples in the last half of ``seen`` (4 half, n)."""
+    bent = seen[2 * half :] - 2.0 * seen[half:-half] + seen[: -2 * half]
+    turns = np.exp(-1j * np.pi * np.arange(2 * half) / half)
+    return np.asarray(np.abs(turns @ bent) / (4.0 * half))
+
+
+def triangle(half: int, count: int) -> Array:
+    """Return a triangle wave from 0 with amplitude 1 at the ends of ``count`` periods, the first one 0 (count,)."""
+    phase = np.arange(count) / half + 0.5
+    return np.asarray(1.0 - 2.0 * np.abs(phase % 2.0 - 1.0))
+
+
+def _pattern(robot: Robot) -> Array:
+    """Return the motion of the longest cables that moves the end along x (m,), the largest one 1."""
+    holes = np.diff(robot.model.first_hole)
+    gain = pose.drive_gain(robot.rest.q, robot.rest.gain, robot.tip)[0] * (holes == holes.max())
+    return np.asarray(gain / np.abs(gain).max())
+
+
+class _Oscillators(NamedTuple):
+    """Modes driven by the drives' wave.
+
+    Attributes:
+        square: Squares of their circular frequencies (n,) [1/s2].
+        damping: Of all [1/s].
+        end: How far each moves the end when it follows the drives at once (n, 3) [m/m].
+    """
+
+    square: Array
+    damping: float
+    end: Array
+
+
+def _answer(robot: Robot, pattern: Array, half: int, period: float, faster: float) -> float:
+    """Return how far the end swings over how far the drives do [m/m], in the second to third wave from rest."""
+    model, first = robot.model, 3 * (robot.tip - FIXED)
+    found = modes.modes(model, robot.rest, np.zeros(robot.n_cables), robot.weight, MODES)
+    static = robot.rest.gain @ pattern
+    part = found.shape.T @ (modes.mass_matrix(model) @ static)
+    centre = found.shape[first : first + 9].reshape(3, 3, MODES).mean(axis=0).T
+    slow = _Oscillators((2.0 * np.pi * faster * found.frequency) ** 2, model.damping, part[:, None] * centre)
+    wave = triangle(half, 6 * half)
+    at_once = static[first : first + 9].reshape(3, 3).mean(axis=0)
+    end = wave[:, None] * (at_once - slow.end.sum(axis=0)) + _follow(slow, wave, period)
+    size = swing(np.column_stack([wave, end])[-4 * half :], half)
+    return float(np.linalg.norm(size[1:]) / size[0])
+
+
+def _follow(slow: _Oscillators, wave: Array, period: float) -> Array:
+    """Return the end (n, 3) [m] moved by oscillators that are driven by a wave (n,) from rest (midpoint rule)."""
+    step, at, speed = period / STEPS, np.zeros_like(slow.square), np.zeros_like(slow.square)
+    ends = [at @ slow.end]
+    for k in range(wave.size - 1):
+        for i in range(STEPS):
+            target = wave[k] + (wave[k + 1] - wave[k]) * (i + 0.5) / STEPS
+            pull = slow.square * (target - at - 0.5 * step * speed) - slow.damping * speed
+            speed = speed + step * pull / (1.0 + 0.25 * step**2 * slow.square)
+            at = at + step * speed
+        ends.append(at @ slow.end)
+    return np.array(ends)
