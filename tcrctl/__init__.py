@@ -41,4 +41,8 @@ Equation numbers refer to the paper, key [TCR] in REFERENCES.md.
 
 from __future__ import annotations
 
+from tcrctl.caches.hook import watch_imports
+
 __version__ = "0.1.0"
+
+watch_imports()

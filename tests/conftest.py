@@ -1,27 +1,19 @@
-"""Compiled kernels that are never stale, and the shipped robots, built once per session."""
+"""Settings of all tests, and the shipped robots, built once per session."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import hypothesis
 import pytest
 
-from tcrctl.cli.kernel_cache import kernel_key
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tcrctl.robot.robot import Robot
-
-#: Compiled kernels of former states of the sources are removed after a week.
-KEPT_S = 7 * 86400.0
-
 
 #: The first example may compile kernels, so no deadline; the same examples every time.
 hypothesis.settings.register_profile("tcrctl", deadline=None, derandomize=True, print_blob=True)
@@ -29,16 +21,9 @@ hypothesis.settings.register_profile("fast", hypothesis.settings.get_profile("tc
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Before numba is imported: one folder of compiled kernels per state of the sources, for all workers."""
+    """Before numba is imported."""
     hypothesis.settings.load_profile("fast" if config.option.markexpr == "fast" else "tcrctl")
-    if "PYTEST_XDIST_WORKER" in os.environ or getattr(config, "cache", None) is None:
-        return  # workers inherit the folder
-    os.environ.setdefault("NUMBA_OPT", "1")  # as the command line does
-    folders = config.cache.mkdir("kernels")
-    for folder in folders.iterdir():
-        if time.time() - folder.stat().st_mtime > KEPT_S:
-            shutil.rmtree(folder, ignore_errors=True)
-    os.environ["NUMBA_CACHE_DIR"] = str(folders / kernel_key())
+    os.environ.setdefault("NUMBA_OPT", "1")  # as the command line does, so that kernels are the same
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:

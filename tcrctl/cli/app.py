@@ -17,7 +17,6 @@ from tcrctl.cli.emulate import emulate
 from tcrctl.cli.export import export
 from tcrctl.cli.identify import identify
 from tcrctl.cli.info import info
-from tcrctl.cli.kernel_cache import keep_kernels
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.paper import paper
@@ -131,7 +130,6 @@ def _prepare_process() -> None:
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("NUMBA_OPT", "1")
-    keep_kernels(os.environ)
 
 
 def _known(error: Exception) -> TcrctlError:

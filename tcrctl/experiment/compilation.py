@@ -1,8 +1,7 @@
-"""Tells the user why a first run takes longer to begin: numba compiles the kernels and keeps them on disk."""
+"""Tells the user why a first run takes longer to begin: the kernels are compiled, and kept if there is room."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -18,21 +17,31 @@ def announced_compilation(say: Callable[[str], None]) -> Iterator[None]:
     from numba.core import event  # heavy
 
     class _First(event.Listener):
-        done = False
+        told: str | None = None
 
         def on_start(self, event: Any) -> None:
             del event
-            if not self.done:
-                self.done = True
-                say(_sentence())
+            if self.told is None:
+                self.told = _sentence()
+                say(self.told)
 
         def on_end(self, event: Any) -> None:
             del event
 
-    with event.install_listener("numba:compile", _First()):
+    listener = _First()
+    with event.install_listener("numba:compile", listener):
         yield
+    if listener.told is not None and _sentence() != listener.told:  # a full disk, say
+        say(_sentence())
 
 
 def _sentence() -> str:
-    kept = os.environ.get("NUMBA_CACHE_DIR")
-    return "compiling numerical kernels (first run only) ..." + (f" kept in {kept}" if kept else "")
+    from tcrctl.caches.kernel_folder import kernel_folder  # heavy
+
+    folder = kernel_folder()
+    kept = folder.kept()
+    if kept is not None:
+        return f"compiling numerical kernels (first run only) ... kept in {kept}"
+    return (
+        f"compiling numerical kernels, which cannot be kept: {folder.trouble} (NUMBA_CACHE_DIR names another)"
+    )

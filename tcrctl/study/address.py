@@ -22,8 +22,8 @@ from tcrctl.experiment.spec import LoadedSpec, with_draws
 _PACKAGE: Final = Path(__file__).parents[1]
 #: Parts of the program that stand above experiments, or beside them: they cannot change a number.
 ABOVE: Final = (
-    "analysis", "cli", "commissioning", "emulate", "executors", "identify", "paper", "plots", "replay", "report",
-    "stability", "study", "tune", "view", "workspace",
+    "analysis", "caches", "cli", "commissioning", "emulate", "executors", "identify", "paper", "plots", "replay",
+    "report", "stability", "study", "tune", "view", "workspace",
 )  # fmt: skip
 #: Packages that kernels and numbers are made with.
 _NUMERIC: Final = ("llvmlite", "numba", "numpy", "scipy")

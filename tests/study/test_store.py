@@ -175,6 +175,6 @@ def test_what_the_address_leaves_out_stands_above_experiments_and_imports_point_
     (layers,) = (contract["layers"] for contract in contracts if contract["id"] == "layers")
     names = [[name.strip(" ()") for name in layer.replace(":", "|").split("|")] for layer in layers]
     above = [name for layer in names[: names.index(["experiment"])] for name in layer]
-    assert {*above, "executors"} == {*ABOVE}
+    assert {*above, "caches", "executors"} == {*ABOVE}
     roots = {name.partition("/")[0] for name, _ in addressing._sources()}
     assert roots == {"tcrctl", "tcr_hardware"}
