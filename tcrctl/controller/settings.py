@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, ClassVar, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -99,6 +99,10 @@ class ControllerSection(Settings):
     def settling(self) -> float:
         """Time at the start in which only the dither moves the drives [s]."""
         return 0.0
+
+    def at_once(self) -> Self:
+        """Return the same without that time."""
+        return self.model_copy(update={"settle_s": 0.0}) if self.settling else self
 
     @property
     def floor_n(self) -> float | None:

@@ -43,6 +43,13 @@ SMOOTHING: Final = 3
 Progress = Callable[[int, int], None]
 
 
+def _at_once(experiment: Experiment) -> Experiment:
+    """Return an experiment whose controller does not settle first: a loop that waits feeds nothing back."""
+    spec = experiment.spec
+    controller = spec.controller.at_once()
+    return replace(experiment, spec=spec.model_copy(update={"controller": controller}))
+
+
 def analysed_steps(steps: int, points: int, every: int | None = None) -> list[int]:
     """Return the steps at which the loop is linearised, the first step never among them.
 
@@ -78,6 +85,7 @@ def analyse(
         InputError: If the plant is not simulated, or has friction, play or the like.
         RunInterruptedError: If a signal asked to stop.
     """
+    experiment = _at_once(experiment)
     plant, state = build_plant(experiment)
     if not isinstance(plant, SimulatedPlant):
         plant.close()

@@ -29,7 +29,7 @@ def drag(size=3e-3):
 def test_the_share_is_found_beside_what_lasts(share):
     h = drag()
     lasting = np.array([0.02, -0.01, 0.005]) + 1e-5 * T[:, None]
-    assert found(share * h + lasting, h) == pytest.approx(share, abs=0.02)
+    assert found(share * h + lasting, h) == pytest.approx(share, rel=0.02, abs=0.005)
 
 
 def test_the_motion_of_the_dither_does_not_count():

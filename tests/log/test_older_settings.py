@@ -102,13 +102,22 @@ def test_files_that_people_write_get_todays_defaults():
         {},
         {"controller": "ioc"},
         {"controller": {"kind": "kinematic", "period_s": 0.1}},
-        {"controller": {"kind": "ioc", "prediction": "literal", "dither": "off", "drives": {"lag_s": 0.0}}},
+        {
+            "controller": {
+                "kind": "ioc",
+                "prediction": "literal",
+                "dither": "off",
+                "drives": {"lag_s": 0.0},
+                "settle_s": 0.0,
+            }
+        },
         {
             "controller": {
                 "kind": "ioc",
                 "prediction": {"kind": "one_step", "horizon_s": 0.4},
                 "dither": "off",
                 "drives": {"lag_s": 0.03},
+                "settle_s": 0.0,
             }
         },
         {"estimator": {"kind": "exact"}},

@@ -33,7 +33,7 @@ from tcrctl.replay.result import Tolerance, Window
 pytestmark = pytest.mark.slow
 
 VARIANTS = {
-    "full": ("controller.dither.probe_mm=0",),  # W is the controller's own from the first step on
+    "full": ("controller.settle_s=0",),  # W is the controller's own from the first step on
     "often_flushed": ("log.flush_steps=10", "log.flush_s=0.1"),
     "lean": ("log.full_state_s=0.5",),
     "literal": ("controller.prediction=literal", "controller.integral=off"),
@@ -46,6 +46,7 @@ VARIANTS = {
 BEFORE = (
     "controller.dither=off",
     "controller.drives.lag_s=0.0",
+    "controller.settle_s=0.0",
     "estimator={kind: passive_observer, fit_start: false, hold_blank: false}",
 )
 #: Estimator and controller as they were before the keys that a log of then does not have.

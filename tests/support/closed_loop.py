@@ -42,7 +42,7 @@ def ioc(prediction="multi_step", **changes) -> IocSettings:
     }
     if below:
         chosen["prediction"] = {**chosen["prediction"], **below}
-    return IocSettings(kind="ioc", **{"dither": None, **chosen, **changes})
+    return IocSettings(kind="ioc", **{"dither": None, "settle_s": 0.0, **chosen, **changes})
 
 
 def pose_settings(**changes) -> IocSettings:

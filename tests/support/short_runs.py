@@ -16,6 +16,7 @@ SHORT = (
     "trajectory.lead_in_s=0.2",
     "trajectory.dwell_s=0",
     "trajectory.settle_s=0.2",
+    "controller.settle_s=0",
 )
 #: A pipe below the rest pose: the end is at its target almost from the start.
 BELOW = (
