@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from support.log_files import doctor
-from support.punctual import Lateness
 from support.short_runs import ROOT, SHORT, arguments, short_spec, start
 from tcrctl.analysis.info import inspect
 from tcrctl.cli.app import main
@@ -460,11 +459,10 @@ def test_a_signal_ends_a_run_with_a_complete_log(running, name, number, code):
 @pytest.mark.slow
 def test_a_killed_run_keeps_all_steps_but_those_of_the_last_flush_interval(running):
     process, folder = running["kill"]
-    with Lateness() as lateness:
-        path = once_running(folder)
-        process.kill()
-        killed = time.time()
-        process.communicate(timeout=20)
+    path = once_running(folder)
+    process.kill()
+    killed = time.time()
+    process.communicate(timeout=20)
     log = read_log(path)
     steps = [s.k for s in log.steps()]
     late = log.columns(["timing_lateness"])["timing_lateness"]
@@ -473,8 +471,7 @@ def test_a_killed_run_keeps_all_steps_but_those_of_the_last_flush_interval(runni
     )  # missed steps are not made up for
     assert not log.complete
     assert steps == list(range(len(steps)))
-    busy = 0.3 + 4.0 * lateness.worst_s  # the program has several threads, each of which may be as late
-    flushed = elapsed - 0.5 - busy  # less the flush interval
+    flushed = elapsed - 0.5 - 0.3  # flush interval, and time for a busy machine
     assert len(steps) >= flushed / 0.05
     mended = recover(path, path.with_name("mended.mcap"))
     assert (mended.steps, mended.lossy) == (len(steps), True)
