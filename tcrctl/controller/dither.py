@@ -38,10 +38,12 @@ class Dithered(NamedTuple):
     Attributes:
         amplitude: Half of the travel to and fro [m].
         place: Where it has moved the drives (m,) [m].
+        fastest: Speed of the drives in the wave [m/s].
     """
 
     amplitude: float
     place: Array
+    fastest: float = 0.0
 
     @property
     def awake(self) -> float:
@@ -86,11 +88,6 @@ class Dither:
         return float(self._sizes[0])
 
     @property
-    def fastest(self) -> float:
-        """Speed of the drives in the wave [m/s]."""
-        return 2.0 * self.amplitude / (self._half_wave * self._period)
-
-    @property
     def thrown(self) -> float | None:
         """By how much more than without friction the probing wave has thrown the end [m]; None: not known."""
         return None if self._probe is None else self._probe.thrown
@@ -102,8 +99,9 @@ class Dither:
 
     @property
     def now(self) -> Dithered:
-        """Amplitude, and where the drives are in the wave."""
-        return Dithered(self.amplitude, self._place.copy())
+        """Amplitude and speed, and where the drives are in the wave."""
+        fastest = 2.0 * self.amplitude / (self._half_wave * self._period)
+        return Dithered(self.amplitude, self._place.copy(), fastest)
 
     @property
     def innovation(self) -> float:

@@ -13,7 +13,8 @@ more where cables rub. The mean of two waves counts.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+import itertools
+from typing import Final
 
 import numpy as np
 
@@ -45,9 +46,9 @@ class FrictionProbe:
     def __init__(self, robot: Robot, half_wave: int, period: float) -> None:
         """Take the robot, half a wave in control periods, and the control period [s]."""
         self.pattern = _pattern(robot)
-        self._along = self.pattern / (self.pattern @ self.pattern)
+        self._along = self.pattern / max(float(self.pattern @ self.pattern), 1.0)
         self._half = half_wave
-        self.frictionless = max(_answer(robot, self.pattern, half_wave, period, faster) for faster in WRONG)
+        self.frictionless = _frictionless(robot, self.pattern, half_wave, period)
         self._past: list[Array] = []
         self._thrown: list[float] = []
 
@@ -84,50 +85,56 @@ def triangle(half: int, count: int) -> Array:
 
 
 def _pattern(robot: Robot) -> Array:
-    """Return the motion of the longest cables that moves the end along x (m,), the largest one 1."""
-    holes = np.diff(robot.model.first_hole)
-    gain = pose.drive_gain(robot.rest.q, robot.rest.gain, robot.tip)[0] * (holes == holes.max())
-    return np.asarray(gain / np.abs(gain).max())
+    """Return the motion of the longest cables that moves the end along x, or else y (m,), the largest one 1.
 
-
-class _Oscillators(NamedTuple):
-    """Modes driven by the drives' wave.
-
-    Attributes:
-        square: Squares of their circular frequencies (n,) [1/s2].
-        damping: Of all [1/s].
-        end: How far each moves the end when it follows the drives at once (n, 3) [m/m].
+    Zeros if they move it nowhere sideways.
     """
+    holes = np.diff(robot.model.first_hole)
+    gain = pose.drive_gain(robot.rest.q, robot.rest.gain, robot.tip)[:2] * (holes == holes.max())
+    most = np.abs(gain).max(axis=1)
+    row = 0 if most[0] >= 0.5 * most[1] else 1
+    return np.asarray(gain[row] / most[row] if most[row] > 0.0 else gain[row])
 
-    square: Array
-    damping: float
-    end: Array
 
-
-def _answer(robot: Robot, pattern: Array, half: int, period: float, faster: float) -> float:
-    """Return how far the end swings over how far the drives do [m/m], in the second to third wave from rest."""
+def _frictionless(robot: Robot, pattern: Array, half: int, period: float) -> float:
+    """Return Y_0 [m/m], from the second and third wave of robots that were at rest before."""
     model, first = robot.model, 3 * (robot.tip - FIXED)
     found = modes.modes(model, robot.rest, np.zeros(robot.n_cables), robot.weight, MODES)
     static = robot.rest.gain @ pattern
     part = found.shape.T @ (modes.mass_matrix(model) @ static)
-    centre = found.shape[first : first + 9].reshape(3, 3, MODES).mean(axis=0).T
-    slow = _Oscillators((2.0 * np.pi * faster * found.frequency) ** 2, model.damping, part[:, None] * centre)
+    slow = part[:, None] * found.shape[first : first + 9].reshape(3, 3, -1).mean(axis=0).T
+    at_once = static[first : first + 9].reshape(3, 3).mean(axis=0) - slow.sum(axis=0)
     wave = triangle(half, 6 * half)
-    at_once = static[first : first + 9].reshape(3, 3).mean(axis=0)
-    end = wave[:, None] * (at_once - slow.end.sum(axis=0)) + _follow(slow, wave, period)
-    size = swing(np.column_stack([wave, end])[-4 * half :], half)
-    return float(np.linalg.norm(size[1:]) / size[0])
+    followed = _follow(
+        (2.0 * np.pi * np.multiply.outer(WRONG, found.frequency)) ** 2, model.damping, wave, period
+    )
+    answers = []
+    for modal in followed:
+        end = np.outer(wave, at_once) + modal @ slow
+        size = swing(np.column_stack([wave, end])[-4 * half :], half)
+        answers.append(float(np.linalg.norm(size[1:]) / size[0]))
+    return max(answers)
 
 
-def _follow(slow: _Oscillators, wave: Array, period: float) -> Array:
-    """Return the end (n, 3) [m] moved by oscillators that are driven by a wave (n,) from rest (midpoint rule)."""
-    step, at, speed = period / STEPS, np.zeros_like(slow.square), np.zeros_like(slow.square)
-    ends = [at @ slow.end]
-    for k in range(wave.size - 1):
+def _follow(square: Array, damping: float, wave: Array, period: float) -> Array:
+    """Move oscillators that are driven by a wave from rest (midpoint rule).
+
+    Args:
+        square: Squares of their circular frequencies, of several robots (robots, modes) [1/s2].
+        damping: Of all [1/s].
+        wave: Where each would rest, at the ends of the periods (n,).
+        period: [s].
+
+    Returns:
+        Where they are at these times (robots, n, modes).
+    """
+    step, at, speed = period / STEPS, np.zeros_like(square), np.zeros_like(square)
+    ends = [at]
+    for before, after in itertools.pairwise(wave):
         for i in range(STEPS):
-            target = wave[k] + (wave[k + 1] - wave[k]) * (i + 0.5) / STEPS
-            pull = slow.square * (target - at - 0.5 * step * speed) - slow.damping * speed
-            speed = speed + step * pull / (1.0 + 0.25 * step**2 * slow.square)
+            target = before + (after - before) * (i + 0.5) / STEPS
+            pull = square * (target - at - 0.5 * step * speed) - damping * speed
+            speed = speed + step * pull / (1.0 + 0.25 * step**2 * square)
             at = at + step * speed
-        ends.append(at @ slow.end)
-    return np.array(ends)
+        ends.append(at)
+    return np.stack(ends, axis=1)

@@ -52,14 +52,13 @@ class Shell:
         """Return the command for the coming period; the drives are held if no trustworthy one was found."""
         at = self._situation(estimate, reference)
         self.dither.observe(at.outputs[:3], estimate, settling=at.settling)
-        reserve = self.dither.fastest
         plan = self._planner.plan(at)
         reason = at.doubt or plan.reason
         rests = bool(reason) or at.settling
         self._speed = np.zeros(self._robot.n_cables) if rests else at.within(plan.speed)
         self.dither.expect(None if rests else plan.expected)
         speed = self._speed if reason else self._shaken(estimate)
-        limit = speed_limit(self._settings) - reserve
+        limit = speed_limit(self._settings) - at.dither.fastest
         self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
         info = ControlInfo(
             converged=not reason,
@@ -90,10 +89,12 @@ class Shell:
         self._normal = now[3:6].copy() if self._settings.output == "pose" else None
         settling = reference.t < self._settings.settling and _rests(reference)
         stands = settling or (planner.anti_windup and bool(self._saturated.any()))
-        gain = 1.0 + self.dither.now.awake * (self._shaken_integral - 1.0)
+        dither = self.dither.now
+        gain = 1.0 + dither.awake * (self._shaken_integral - 1.0)
         shift = self._integral.update(error, stands, gain)
-        reserve = self.dither.fastest
-        low, high = input_limits(self._settings, self._robot, estimate.drive, planner.blocks, reserve)
+        low, high = input_limits(
+            self._settings, self._robot, estimate.drive, planner.blocks, reserve=dither.fastest
+        )
         return Situation(
             estimate=estimate,
             reference=reference,
@@ -105,7 +106,7 @@ class Shell:
             low=low,
             high=high,
             doubt=_doubt(estimate),
-            dither=self.dither.now,
+            dither=dither,
             settling=settling,
         )
 

@@ -135,7 +135,7 @@ def test_a_dither_that_runs_anyway_does_not_probe(tcr700):
 def test_it_takes_its_part_of_the_speed_limit_and_no_more(tcr700):
     dither = running(tcr700, limit=0.05, speed_part=0.4)
     assert settle(dither, tcr700, thrown=2.0)[PROBED] == pytest.approx(1e-3)
-    assert dither.fastest == pytest.approx(0.02, rel=0.01)
+    assert dither.now.fastest == pytest.approx(0.02, rel=0.01)
     assert np.abs(np.diff(places(dither, 3 * WAVE), axis=0)).max() <= 0.02 * PERIOD * (1.0 + 1e-9)
 
 

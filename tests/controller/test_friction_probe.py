@@ -58,6 +58,13 @@ def test_the_swing_of_a_wave_is_its_amplitude():
     np.testing.assert_allclose(found, [1.0, 3.0, 0.0], atol=1e-12)
 
 
+def test_a_robot_whose_end_no_cable_moves_sideways_is_not_probed(tcr700):
+    rest = tcr700.rest._replace(gain=np.zeros_like(tcr700.rest.gain))
+    probe = FrictionProbe(replace(tcr700, rest=rest), HALF, PERIOD)
+    assert not probe.pattern.any()
+    assert told(probe, np.ones((20, 3))) is None
+
+
 @pytest.mark.parametrize("name", ["tcr600", "tcr700", "tcr5x4"])
 def test_the_pattern_moves_the_end_sideways_and_shortens_nothing(name, request):
     pattern = FrictionProbe(request.getfixturevalue(name), HALF, PERIOD).pattern
