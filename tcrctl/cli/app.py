@@ -32,6 +32,7 @@ from tcrctl.cli.runs import runs
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
 from tcrctl.cli.stability import stability
+from tcrctl.cli.streams import Output, robust_streams
 from tcrctl.cli.sweep import sweep
 from tcrctl.cli.tune import tune
 from tcrctl.cli.validate import validate
@@ -62,6 +63,9 @@ VERBS: dict[str, Callable[..., None]] = {
     "plot": plot,
     "report": report,
 }
+
+#: Verbs of which nothing is left if their output cannot be written.
+ONLY_SAY = ("list", "show", "schema", "info", "runs", "diff")
 
 
 def _print_version(wanted: bool) -> None:
@@ -108,6 +112,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     _prepare_process()
     given = list(sys.argv[1:] if arguments is None else arguments)
+    with robust_streams() as output:
+        code = _run_verb(given)
+        return _with_delivery(code, given, output)
+
+
+def _run_verb(given: list[str]) -> int:
     as_json = "--json" in given
     try:
         build_app()(args=given, prog_name="tcrctl")
@@ -121,6 +131,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         return _report(_known(error), error, as_json)
     return 0
+
+
+def _with_delivery(code: int, given: list[str], output: Output) -> int:
+    """Return the exit code, which is another one if a verb did nothing but say something that got lost.
+
+    A reader that has gone had enough.
+    """
+    output.flush()
+    if code or output.failure is None or isinstance(output.failure, BrokenPipeError):
+        return code
+    text = f"error: the output could not be written: {output.failure.strerror}"
+    print(text, file=sys.stderr)
+    return DeviceError.exit_code if given[:1] and given[0] in ONLY_SAY else code
 
 
 def _prepare_process() -> None:

@@ -36,6 +36,7 @@ from tcrctl.loop.interruption import Interruption
 from tcrctl.loop.loop import Parts, run_loop
 from tcrctl.loop.pacing import Pace, RealTime, Unpaced
 from tcrctl.loop.quiet import quiet_interpreter
+from tcrctl.loop.telling import unfailing
 from tcrctl.plant.plant import RunnablePlant
 from tcrctl.plant.rig.journal import Journal
 from tcrctl.plant.rig.operation import Operation
@@ -81,8 +82,8 @@ def run_experiment(
         out: Where the run's folder is made.
         realtime: Pace a simulated plant by the clock; a rig is always paced.
         confirmed: The operator has agreed that the rig moves; without it a rig is measured, not armed.
-        notify: Takes messages for the user.
-        progress: Takes the number of steps done and their total, after every step.
+        notify: Takes messages for the user; that it fails changes nothing.
+        progress: Takes the number of steps done and their total, after every step; as ``notify``.
         tap: Takes every message of the log, in the log's thread; see :class:`tcrctl.view.live.LiveView`.
         check: Called before every step; what it raises ends the run.
 
@@ -93,6 +94,7 @@ def run_experiment(
         DeviceError: If the run cannot be recorded or the plant not be reached; no folder is left behind.
     """
     check_writable(out)
+    notify, progress = unfailing(notify), unfailing(progress)
     realtime = realtime or experiment.paced
     with Interruption() as interruption:
 

@@ -253,6 +253,15 @@ def test_a_second_ctrl_c_leaves_a_finished_log_and_a_closed_plant(short, tmp_pat
     assert len(list(log.steps())) == 8
 
 
+def test_nobody_who_is_told_about_a_run_can_end_it(short, tmp_path):
+    def gone(*message):
+        raise BrokenPipeError(32, "Broken pipe")
+
+    summary = run_experiment(short, out=tmp_path, notify=gone, progress=gone)
+    assert (summary.status, summary.exit_code) == ("success", 0)
+    assert read_log(summary.log).complete
+
+
 def test_a_disk_that_fills_up_is_an_error_and_the_plant_is_closed(short, tmp_path, monkeypatch):
     closed = failing_plant(monkeypatch, DeviceError("unused"))
     step = LogWriter.step
