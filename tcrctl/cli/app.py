@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, MutableMapping, Sequence
 from typing import Annotated
 
 import typer
@@ -37,7 +38,7 @@ from tcrctl.cli.sweep import sweep
 from tcrctl.cli.tune import tune
 from tcrctl.cli.validate import validate
 from tcrctl.cli.workspace import workspace
-from tcrctl.errors import DeviceError, SpecError, TcrctlError
+from tcrctl.errors import DeviceError, InputError, SpecError, TcrctlError
 
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,
@@ -110,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    _prepare_process()
+    _prepare_process(os.environ)
     given = list(sys.argv[1:] if arguments is None else arguments)
     with robust_streams() as output:
         code = _run_verb(given)
@@ -146,24 +147,35 @@ def _with_delivery(code: int, given: list[str], output: Output) -> int:
     return DeviceError.exit_code if given[:1] and given[0] in ONLY_SAY else code
 
 
-def _prepare_process() -> None:
+def _prepare_process(environment: MutableMapping[str, str]) -> None:
     """Set what libraries read when they are loaded.
 
     Threads for the small matrices of a control step would only wait for each other. The kernels gain nothing from
     the compiler's higher levels, and a cold start is a fifth shorter without them.
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ.setdefault("NUMBA_OPT", "1")
-    keep_kernels(os.environ)
+    environment.setdefault("OPENBLAS_NUM_THREADS", "1")
+    environment.setdefault("NUMBA_OPT", "1")
+    for size in ("COLUMNS", "LINES"):  # 0 stands for unknown, and would be taken for no room at all
+        if environment.get(size, "1").strip("0") == "":
+            del environment[size]
+    keep_kernels(environment)
 
 
 def _known(error: Exception) -> TcrctlError:
     if isinstance(error, TcrctlError):
         return error
     if isinstance(error, OSError):
-        return DeviceError(str(error))
+        return (
+            InputError(f"{error.filename}: {error.strerror}")
+            if _is_bad_name(error)
+            else DeviceError(str(error))
+        )
     hint = "Set TCRCTL_TRACEBACK=1 for the traceback; this is a fault of the program, please report it."
     return TcrctlError(f"internal error: {type(error).__name__}: {error}", hint=hint)
+
+
+def _is_bad_name(error: OSError) -> bool:
+    return error.errno == errno.ENAMETOOLONG and error.filename is not None
 
 
 def _report(error: TcrctlError, raised: Exception, as_json: bool) -> int:

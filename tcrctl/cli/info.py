@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import LogFiles
 from tcrctl.cli.options import AsJson
 
@@ -32,11 +33,9 @@ def info(logs: LogFiles, as_json: AsJson = False) -> None:
 
 
 def _print_tables(found: LogInfo) -> None:
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
-    console = Console()
+    screen = console()
     provenance = {**found.start, **found.versions}
     for title, rows in (("", _facts(found)), ("provenance", provenance), ("criteria", _criteria(found))):
         if not rows:
@@ -45,8 +44,8 @@ def _print_tables(found: LogInfo) -> None:
         table.add_column(style="bold", no_wrap=True)
         table.add_column(overflow="fold")
         for name, value in rows.items():
-            table.add_row(escape(name), escape(str(value)))
-        console.print(table)
+            table.add_row(escaped(name), escaped(value))
+        screen.print(table)
 
 
 def _facts(found: LogInfo) -> dict[str, Any]:

@@ -19,6 +19,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Final, TextIO
 
+from tcrctl.visible import visible
+
 #: A message waits this long for a reader that is busy [s]. The control loop waits with it.
 PATIENCE_S: Final = 0.02
 
@@ -73,9 +75,18 @@ class Output(io.TextIOBase):
         return self._fd
 
     def write(self, text: str) -> int:
-        """Write text, or drop it."""
+        """Write text, or drop it; characters that act on a terminal are spelt out, styles excepted."""
         if not isinstance(text, str):
             raise TypeError(f"a text stream takes str, not {type(text).__name__}")
+        keep = self.isatty() or bool(os.environ.get("FORCE_COLOR"))
+        return self._take(visible(text, keep_styles=keep))
+
+    @property
+    def styled(self) -> TextIO:
+        """The same stream for who has made sure that nothing in the text acts on a terminal but on purpose."""
+        return _Styled(self)  # type: ignore[return-value]
+
+    def _take(self, text: str) -> int:
         with self._lock:
             self._waiting += text
             at_once = self._patience is not None or self.isatty()
@@ -115,6 +126,29 @@ class Output(io.TextIOBase):
         patience = 0.0 if self._blocked else self._patience
         self._blocked = not poll.poll(None if patience is None else 1e3 * patience)
         return not self._blocked
+
+
+class _Styled(io.TextIOBase):
+    """Writes to an output as it is."""
+
+    def __init__(self, output: Output) -> None:
+        self._output = output
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        return self._output.encoding
+
+    def isatty(self) -> bool:
+        return self._output.isatty()
+
+    def fileno(self) -> int:
+        return self._output.fileno()
+
+    def write(self, text: str) -> int:
+        return self._output._take(text)
+
+    def flush(self) -> None:
+        self._output.flush()
 
 
 @contextmanager

@@ -8,6 +8,7 @@ begin with ``identify_``; studies lie in ``studies/`` below them.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
 from tcrctl.errors import InputError, UnknownNameError
@@ -148,15 +149,31 @@ def _is_kind(kind: str, name_or_path: str, shipped: Mapping[str, Path]) -> bool:
     if not is_path(name_or_path):
         return name_or_path in shipped
     try:
-        data = strict_yaml.load(Path(name_or_path).expanduser()).data
+        return _kind_in(strict_yaml.read(Path(name_or_path).expanduser())) == kind
     except InputError:
         return False
-    return isinstance(data, dict) and data.get("kind") == kind
+
+
+@lru_cache(maxsize=8)
+def _kind_in(content: bytes) -> str:
+    """Return what a file calls itself; empty if it does not. A long file is asked several times."""
+    from tcrctl.config import strict_yaml
+
+    data = strict_yaml.loads(content).data
+    kind = data.get("kind") if isinstance(data, dict) else ""
+    return kind if isinstance(kind, str) else ""
 
 
 def is_path(name_or_path: str) -> bool:
     """Tell a path (has a separator or ends in .yaml, .yml) from a shipped name."""
     return "/" in name_or_path or "\\" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # for instance a name longer than any can be
+        return False
 
 
 def _by_name(folder: Path) -> dict[str, Path]:
@@ -166,7 +183,7 @@ def _by_name(folder: Path) -> dict[str, Path]:
 def _find(kind: str, name_or_path: str, shipped: Mapping[str, Path], folder: Path) -> Path:
     if is_path(name_or_path):
         path = folder / Path(name_or_path).expanduser()
-        if not path.is_file():
+        if not _is_file(path):
             raise InputError(f"{path}: there is no such file")
         return path
     if name_or_path not in shipped:
