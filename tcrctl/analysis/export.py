@@ -147,6 +147,8 @@ def _flat(name: str, values: NDArray[Any], log: Log) -> dict[str, NDArray[Any]]:
     if values.ndim == 1:
         return {name + unit: values}
     numbers = values.reshape(len(values), -1) if values.size else values.reshape(len(values), 0)
+    if not len(values):  # how many numbers a step would have is not known
+        return {f"{name}_{label}{unit}": values.reshape(-1) for label in AXES if values.shape[1:] == (3,)}
     labels = _labels(COLUMNS[name], values.shape[1:], log)
     return {f"{name}_{label}{unit}": numbers[:, i] for i, label in enumerate(labels)}
 
