@@ -124,8 +124,9 @@ def _run_verb(given: list[str]) -> int:
         build_app()(args=given, prog_name="tcrctl")
     except SystemExit as end:  # how typer ends, always
         if end.code == 2 and as_json:
-            said = getattr(end.__context__, "format_message", lambda: "wrong usage")
-            _print_json(str(said()))
+            said = getattr(end.__context__, "format_message", None)
+            if said is not None:  # else a verb has ended so, and has printed its object
+                _print_json(str(said()))
         return end.code if isinstance(end.code, int) else int(end.code is not None)
     except KeyboardInterrupt:
         return 130

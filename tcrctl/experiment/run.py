@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from tcrctl.errors import DeviceError, LogError, StoppedError, TcrctlError
+from tcrctl.errors import DeviceError, InputError, LogError, StoppedError, TcrctlError
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.outcome import summary_of
 from tcrctl.experiment.prepare import Experiment, Notify, build_parts, build_plant, make_task, silent
@@ -212,18 +212,25 @@ def _recorded_run(
 def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogWriter) -> TcrctlError | None:
     """Go through all steps and leave the plant safe; return why it ended before the end, if it did."""
     failure: TcrctlError | None = None
+    started = False
     try:
         with _pace_kept(experiment, parts.pace, log):
             plant.start()
+            started = True
             run_loop(parts)
     except TcrctlError as error:
-        failure = error
+        failure = _in_mid_run(error) if started else error
     finally:
         try:
             plant.close()
         except TcrctlError as error:  # what ended the run first is the reason
             failure = failure or error
     return failure
+
+
+def _in_mid_run(error: TcrctlError) -> TcrctlError:
+    """Return an error of the input, which was right when the run began, as one of whatever has changed since."""
+    return DeviceError(str(error), hint=error.hint) if isinstance(error, InputError) else error
 
 
 def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractContextManager[None]:

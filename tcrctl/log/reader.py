@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import shlex
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from google.protobuf.message import DecodeError
 from mcap.records import Attachment, Channel, Header, Message, Metadata
@@ -20,6 +22,8 @@ from tcrctl.log.mcap_file import EVENT_TOPIC, START, STEP_TOPIC, STOP
 from tcrctl.log.scan import Scan, check_is_mcap
 from tcrctl.log.steps import StepDecoder
 from tcrctl.signals import StepRecord
+
+_USUAL_PERIOD_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +51,21 @@ class Log:
     cable_names: tuple[str, ...]
     marker_names: tuple[str, ...]
     damages: tuple[str, ...] = ()
+
+    @property
+    def epoch_ns(self) -> int:
+        """Unix time of t = 0 [ns]; 0 if the log does not tell."""
+        told = self.start.get("epoch_ns", "")
+        return int(told) if re.fullmatch("[0-9]{1,19}", told) else 0
+
+    @property
+    def period_s(self) -> float:
+        """Control period [s]; that of our experiments if the log does not tell."""
+        try:
+            told = float(self.start.get("period_s", ""))
+        except ValueError:
+            return _USUAL_PERIOD_S
+        return told if 0.0 < told < math.inf else _USUAL_PERIOD_S
 
     def steps(self) -> Iterator[StepRecord]:
         """Yield every step that is whole, in the order written, with arrays equal bit for bit.

@@ -54,8 +54,7 @@ class Tape:
         log = read_log(path, damaged=True)
         self.path, self._complete = path, log.complete and not log.damages
         self.damages = log.damages
-        self._epoch_ns = int(log.start.get("epoch_ns", "0"))
-        self.period = float(log.start.get("period_s", "0.05"))
+        self._epoch_ns, self.period = log.epoch_ns, log.period_s
         self.static: list[Sent] = []
         found = self._read_index() if self._complete else self._read_all()
         for topic in topics:

@@ -253,6 +253,14 @@ def test_a_second_ctrl_c_leaves_a_finished_log_and_a_closed_plant(short, tmp_pat
     assert len(list(log.steps())) == 8
 
 
+@pytest.mark.slow
+def test_what_fitted_at_the_start_and_does_not_later_is_a_device(tmp_path, monkeypatch, capsys):
+    failing_plant(monkeypatch, InputError("the PLC says it is another one"), write_at=0.3)
+    assert main(["run", "letter_t", "--json", "--out", str(tmp_path), *arguments()]) == 5
+    (line,) = capsys.readouterr().out.splitlines()
+    assert json.loads(line)["reason"] == "the PLC says it is another one"
+
+
 def test_nobody_who_is_told_about_a_run_can_end_it(short, tmp_path):
     def gone(*message):
         raise BrokenPipeError(32, "Broken pipe")
