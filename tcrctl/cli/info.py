@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from typing import TYPE_CHECKING, Any
 
 from tcrctl.cli.console import console, escaped
@@ -49,7 +50,7 @@ def _print_tables(found: LogInfo) -> None:
 
 
 def _facts(found: LogInfo) -> dict[str, Any]:
-    complete = "yes" if found.complete else f"no; mend it with: tcrctl recover {found.path}"
+    complete = "yes" if found.complete else f"no; mend it with: tcrctl recover {shlex.quote(found.path)}"
     rate = f" at {found.rate_hz:.4g} Hz" if found.rate_hz else ""
     per_step = f", {found.bytes_per_step:.0f} per step" if found.bytes_per_step else ""
     return {

@@ -51,7 +51,7 @@ def play(
     end; Ctrl-C ends the program. The address is printed on stdout.
 
     Examples:
-      tcrctl play logs/*_letter_t_*/log.mcap
+      tcrctl play logs/latest
       tcrctl play log.mcap --rate 5 --from 10 --loop
     """
     from tcrctl.errors import RunInterruptedError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -238,4 +239,4 @@ def _print_summary(summary: Summary) -> None:
     for name, text, style in rows(summary):
         table.add_row(escaped(name), escaped(text), style=style)
     screen.print(table)
-    print(f"look at the log: tcrctl info {summary.log}")
+    print(f"look at the log: tcrctl info {shlex.quote(str(summary.log))}")

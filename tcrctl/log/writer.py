@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import os
+import shlex
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -181,7 +182,7 @@ class LogWriter:
             raise LogError(self.path, "is finished; nothing can be added")
 
     def _error(self, failure: Exception) -> LogError:
-        hint = f"Everything up to the last flush is readable: tcrctl recover {self.path}"
+        hint = f"Everything up to the last flush is readable: tcrctl recover {shlex.quote(str(self.path))}"
         return LogError(self.path, f"writing failed: {failure}", hint=hint)
 
     def _let_write(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -115,7 +116,7 @@ class Tape:
                 for _, channel, message in SeekingReader(stream).iter_messages(topics, starting_at=begin_ns):
                     yield Sent(message.log_time, channel.topic, message.data)
             except Exception as error:  # what damage makes the reader raise has no common base
-                hint = f"Save the undamaged steps: tcrctl recover {self.path}"
+                hint = f"Save the undamaged steps: tcrctl recover {shlex.quote(str(self.path))}"
                 raise LogError(self.path, f"is damaged: {error}", hint=hint) from error
 
     def _scanned(self, begin_ns: int) -> Iterator[Sent]:

@@ -23,6 +23,7 @@ from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
 from tcrctl.config.settings import Settings
 from tcrctl.errors import DeviceError, InputError, UntrustworthyDeviceError
 from tcrctl.plant.rig.devices import DriveControl, DriveStatus
+from tcrctl.plant.rig.loopback import emulate_hint
 from tcrctl.plant.rig.settings import CableDrive, ModbusRtu, ModbusTcp, MountedRobot, SafetyRules
 
 _WRONG_FILE: Final = (MapError, PlcMismatchError, RateError)
@@ -163,7 +164,8 @@ class ModbusDrives:
         except _HOPELESS as error:
             raise UntrustworthyDeviceError(f"{self._where}: {error}", hint=error.hint) from error
         except HardwareError as error:
-            raise DeviceError(f"{self._where}: {error}", hint=error.hint) from error
+            hint = emulate_hint(self._where) or error.hint
+            raise DeviceError(f"{self._where}: {error}", hint=hint) from error
 
     def _translated(self, answer: Any) -> DriveStatus:
         self._raw = list(answer.positions_um)
