@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import struct
 
 import numpy as np
@@ -10,7 +11,7 @@ import zstandard
 from mcap.writer import CompressionType, Writer
 
 from support import records
-from support.log_files import N_STEPS, write_steps
+from support.log_files import N_STEPS, open_log, write_steps
 from support.log_mutants import accepted, chunk_starts, mutants, starts
 from tcrctl.errors import LogError
 from tcrctl.log import chunks
@@ -144,3 +145,23 @@ def test_a_seal_changes_with_name_and_entries_and_older_logs_have_none():
     assert unsealed("x", entries) == entries
     assert sealed("x", sealed("x", entries)) == sealed("x", entries)
     assert SEAL in sealed("x", {})
+
+
+@pytest.mark.parametrize("end", ["renamed", "deleted", "replaced"])
+def test_a_file_that_is_not_at_its_path_any_more_is_no_success(tmp_path, end):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    log = open_log(folder / "log.mcap")
+    log.step(records.record(0))
+    if end == "renamed":
+        folder.rename(tmp_path / "kept")
+    elif end == "deleted":
+        shutil.rmtree(folder)
+    else:
+        (folder / "log.mcap").rename(tmp_path / "kept.mcap")
+        (folder / "log.mcap").write_bytes(b"another")
+    said = "lost" if end == "deleted" else "moved while it was written"
+    with pytest.raises(LogError, match=f"is not there any more: .*{said}"):
+        log.finish({"status": "success"})
+    if end == "renamed":
+        assert read_log(tmp_path / "kept" / "log.mcap").complete
