@@ -10,6 +10,8 @@ import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tcrctl.visible import visible
+
 
 class TcrctlError(Exception):
     """Base of all errors of tcrctl.
@@ -22,8 +24,8 @@ class TcrctlError(Exception):
     exit_code = 1
 
     def __init__(self, message: str, *, hint: str = "") -> None:
-        super().__init__(message)
-        self.hint = hint
+        super().__init__(visible(message))
+        self.hint = visible(hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +45,8 @@ class Problem:
     def __str__(self) -> str:
         """Return ``where: key: message``, without the key where it would stand twice."""
         if not self.key or self.where == f"--set {self.key}":
-            return f"{self.where}: {self.message}"
-        return f"{self.where}: {self.key}: {self.message}"
+            return visible(f"{self.where}: {self.message}")
+        return visible(f"{self.where}: {self.key}: {self.message}")
 
 
 class InputError(TcrctlError):
@@ -75,6 +77,7 @@ class UnknownNameError(InputError):
     """
 
     def __init__(self, kind: str, name: str, allowed: Sequence[str]) -> None:
+        name = name if len(name) <= 100 else f"{name[:100]}..."
         close = difflib.get_close_matches(name, allowed, n=1)
         hint = f"Did you mean {close[0]}?" if close else ""
         super().__init__(f"there is no {kind} named {name!r}; known: {', '.join(allowed)}", hint=hint)

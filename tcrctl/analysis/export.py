@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from tcrctl.errors import InputError, LogError
 from tcrctl.log.columns import COLUMNS, Column
 from tcrctl.log.reader import Log, read_log
+from tcrctl.visible import cell
 
 AXES: Final = ("x", "y", "z")
 UNIT_SUFFIX: Final = {"m": "_m", "m/s": "_m_s", "N": "_n", "s": "_s"}
@@ -52,7 +53,7 @@ def export_csv(
     table = _table(read_log(path), nodes)
     with _create(Path(out), force) as stream:
         writer = csv.writer(stream)
-        writer.writerow(table)
+        writer.writerow(map(cell, table))
         writer.writerows(zip(*(_cells(values) for values in table.values()), strict=True))
     return list(table)
 
@@ -146,6 +147,8 @@ def _flat(name: str, values: NDArray[Any], log: Log) -> dict[str, NDArray[Any]]:
     if values.ndim == 1:
         return {name + unit: values}
     numbers = values.reshape(len(values), -1) if values.size else values.reshape(len(values), 0)
+    if not len(values):  # how many numbers a step would have is not known
+        return {f"{name}_{label}{unit}": values.reshape(-1) for label in AXES if values.shape[1:] == (3,)}
     labels = _labels(COLUMNS[name], values.shape[1:], log)
     return {f"{name}_{label}{unit}": numbers[:, i] for i, label in enumerate(labels)}
 

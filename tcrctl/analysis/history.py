@@ -203,7 +203,7 @@ def _labels(logs: Sequence[Log]) -> list[str]:
 def _overrides(log: Log) -> list[str]:
     try:
         given = json.loads(log.start.get("overrides", "[]"))
-    except ValueError:
+    except (ValueError, RecursionError):
         return []
     return [str(item) for item in given] if isinstance(given, list) else []
 

@@ -45,7 +45,7 @@ class FoundRun:
         """What the user has called it."""
         try:
             return tuple(map(str, json.loads((self.folder / TAGS).read_text("utf-8"))))
-        except (OSError, ValueError):
+        except (OSError, ValueError, TypeError, RecursionError):  # somebody else may have written it
             return ()
 
     def value(self, name: str) -> Value:
@@ -124,7 +124,7 @@ def _runs(out: Path) -> Iterator[FoundRun]:
             continue
         try:
             summary = json.loads(path.read_text("utf-8"))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             continue
         if isinstance(summary, dict) and "run_id" in summary:
             yield FoundRun(path.parent, summary)

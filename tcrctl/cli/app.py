@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, MutableMapping, Sequence
 from typing import Annotated
 
 import typer
@@ -31,11 +32,12 @@ from tcrctl.cli.runs import runs
 from tcrctl.cli.schema import schema
 from tcrctl.cli.show import show
 from tcrctl.cli.stability import stability
+from tcrctl.cli.streams import Output, robust_streams
 from tcrctl.cli.sweep import sweep
 from tcrctl.cli.tune import tune
 from tcrctl.cli.validate import validate
 from tcrctl.cli.workspace import workspace
-from tcrctl.errors import DeviceError, SpecError, TcrctlError
+from tcrctl.errors import DeviceError, InputError, SpecError, TcrctlError
 
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,
@@ -61,6 +63,9 @@ VERBS: dict[str, Callable[..., None]] = {
     "plot": plot,
     "report": report,
 }
+
+#: Verbs of which nothing is left if their output cannot be written.
+ONLY_SAY = ("list", "show", "schema", "info", "runs", "diff")
 
 
 def _print_version(wanted: bool) -> None:
@@ -105,15 +110,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    _prepare_process()
+    _prepare_process(os.environ)
     given = list(sys.argv[1:] if arguments is None else arguments)
+    with robust_streams() as output:
+        code = _run_verb(given)
+        return _with_delivery(code, given, output)
+
+
+def _run_verb(given: list[str]) -> int:
     as_json = "--json" in given
     try:
         build_app()(args=given, prog_name="tcrctl")
     except SystemExit as end:  # how typer ends, always
         if end.code == 2 and as_json:
-            said = getattr(end.__context__, "format_message", lambda: "wrong usage")
-            _print_json(str(said()))
+            said = getattr(end.__context__, "format_message", None)
+            if said is not None:  # else a verb has ended so, and has printed its object
+                _print_json(str(said()))
         return end.code if isinstance(end.code, int) else int(end.code is not None)
     except KeyboardInterrupt:
         return 130
@@ -122,23 +134,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _prepare_process() -> None:
+def _with_delivery(code: int, given: list[str], output: Output) -> int:
+    """Return the exit code, which is another one if a verb did nothing but say something that got lost.
+
+    A reader that has gone had enough.
+    """
+    output.flush()
+    if code or output.failure is None or isinstance(output.failure, BrokenPipeError):
+        return code
+    text = f"error: the output could not be written: {output.failure.strerror}"
+    print(text, file=sys.stderr)
+    return DeviceError.exit_code if given[:1] and given[0] in ONLY_SAY else code
+
+
+def _prepare_process(environment: MutableMapping[str, str]) -> None:
     """Set what libraries read when they are loaded.
 
     Threads for the small matrices of a control step would only wait for each other. The kernels gain nothing from
     the compiler's higher levels, and a cold start is a fifth shorter without them.
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ.setdefault("NUMBA_OPT", "1")
+    environment.setdefault("OPENBLAS_NUM_THREADS", "1")
+    environment.setdefault("NUMBA_OPT", "1")
+    for size in ("COLUMNS", "LINES"):  # 0 stands for unknown, and would be taken for no room at all
+        if environment.get(size, "1").strip("0") == "":
+            del environment[size]
 
 
 def _known(error: Exception) -> TcrctlError:
     if isinstance(error, TcrctlError):
         return error
     if isinstance(error, OSError):
-        return DeviceError(str(error))
+        return (
+            InputError(f"{error.filename}: {error.strerror}")
+            if _is_bad_name(error)
+            else DeviceError(str(error))
+        )
     hint = "Set TCRCTL_TRACEBACK=1 for the traceback; this is a fault of the program, please report it."
     return TcrctlError(f"internal error: {type(error).__name__}: {error}", hint=hint)
+
+
+def _is_bad_name(error: OSError) -> bool:
+    return error.errno == errno.ENAMETOOLONG and error.filename is not None
 
 
 def _report(error: TcrctlError, raised: Exception, as_json: bool) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +28,8 @@ def calibrate_log(log: str, changes: Sequence[str], out: Path, say: Say, as_json
     else:
         _print(found.result)
         rubs = " --set controller.dither.least_mm=2" if found.result.rubbing.rubs else ""
-        print(f"next run: tcrctl run SPEC --set estimator.calibration={calibration}{rubs}")
+        setting = shlex.quote(f"estimator.calibration={calibration}")
+        print(f"next run: tcrctl run SPEC --set {setting}{rubs}")
         print(f"the robot as it was found, to look at or to try as robot: {robot}")
     return 0 if found.result.fit.converged else 1
 
@@ -44,7 +46,7 @@ def design_poses(name: str, changes: Sequence[str], out: Path, say: Say, as_json
             f"{designed.poses} of {designed.candidates} poses: information {designed.information:.1f}, "
             f"{designed.drawn:.1f} if drawn (log det over that of the prior)"
         )
-        print(f"next: tcrctl run {designed.path}")
+        print(f"next: tcrctl run {shlex.quote(str(designed.path))}")
     return 0
 
 

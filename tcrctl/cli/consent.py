@@ -13,7 +13,7 @@ def check_can_ask() -> None:
     """
     from tcrctl.errors import InputError
 
-    if not sys.stdin.isatty():
+    if not _is_terminal():
         raise InputError(
             "a rig moves only with consent, and there is no terminal to ask on",
             hint="--yes agrees in advance; first make sure that nobody is within the robot's reach.",
@@ -38,5 +38,19 @@ def ask(what: str) -> None:
         file=sys.stderr,
     )
     sys.stderr.flush()
-    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+    if _answer().strip().lower() not in ("y", "yes"):
         raise InputError("not agreed; nothing has moved")
+
+
+def _is_terminal() -> bool:
+    try:
+        return sys.stdin is not None and sys.stdin.isatty()
+    except (OSError, ValueError):  # closed
+        return False
+
+
+def _answer() -> str:
+    try:
+        return sys.stdin.readline()
+    except (OSError, ValueError):  # gone, or no text
+        return ""

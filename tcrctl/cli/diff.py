@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import log_path
 from tcrctl.cli.options import AsJson
 
@@ -62,12 +63,10 @@ def _text(value: Any) -> str:
 
 
 def _table(title: str, head: Sequence[str], rows: Iterable[tuple[str, ...]]) -> None:
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
     table = Table(*head, title=title, title_justify="left", box=None)
     for row in rows:
-        table.add_row(*(escape(cell) for cell in row))
+        table.add_row(*(escaped(cell) for cell in row))
     if table.row_count:
-        Console().print(table)
+        console().print(table)

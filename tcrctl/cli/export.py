@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import LogFile
 from tcrctl.cli.options import AsJson, unfolded
 
@@ -17,16 +18,14 @@ from tcrctl.cli.options import AsJson, unfolded
 def _print_columns(wanted: bool) -> None:
     if not wanted:
         return
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
     from tcrctl.log.columns import COLUMNS, meanings
 
     table, said = Table("column", "unit", "meaning", box=None), meanings()
     for name, column in COLUMNS.items():
-        table.add_row(name, column.unit, escape(said.get(name, "")))
-    Console().print(table)
+        table.add_row(name, column.unit, escaped(said.get(name, "")))
+    console().print(table)
     raise typer.Exit()
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tcrctl.cli.console import console
 from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, SideBySide, unfolded
 
 if TYPE_CHECKING:
@@ -246,12 +247,11 @@ def _progress_line(*, shown: bool) -> Iterator[Callable[[str, int, float], None]
         return
     import time
 
-    from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     begin = time.perf_counter()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading data", total=None)
 
         def show(what: str, evaluations: int, best_mm: float) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.table import Table
+
+from tcrctl.cli.console import console, escaped
 
 if TYPE_CHECKING:
     from tcrctl.identify.result import Result
@@ -14,13 +15,13 @@ if TYPE_CHECKING:
 
 def print_result(result: Result) -> None:
     """Print parameters, errors and methods."""
-    console = Console()
+    screen = console()
     for table in (_parameters(result), _errors(result), _methods(result)):
-        console.print(table)
+        screen.print(table)
     angle = math.degrees(result.frame.yaw)
     if result.frame.free_yaw or result.frame.free_offset:
         offset = ", ".join(f"{1e3 * value:.2f}" for value in result.frame.offset)
-        console.print(f"measurement frame: yaw {angle:.2f} deg, offset [{offset}] mm")
+        screen.print(f"measurement frame: yaw {angle:.2f} deg, offset [{offset}] mm")
 
 
 def _parameters(result: Result) -> Table:
@@ -31,7 +32,9 @@ def _parameters(result: Result) -> Table:
         std = math.nan if result.certainty is None else float(result.certainty.std[i])
         percent = 100.0 * std / abs(float(value)) if value else math.nan
         bounds = f"{p.low:.5g} .. {p.high:.5g}"
-        table.add_row(p.path, f"{p.start:.5g}", f"{value:.5g}", _number(std), _number(percent), bounds)
+        table.add_row(
+            escaped(p.path), f"{p.start:.5g}", f"{value:.5g}", _number(std), _number(percent), bounds
+        )
     return table
 
 
@@ -40,7 +43,9 @@ def _errors(result: Result) -> Table:
     for name in ("", "before", "after", "held out"):
         table.add_column(name, justify="left" if not name else "right", no_wrap=True)
     for group in result.groups:
-        table.add_row(group.name, *map(_number, (group.before_mm, group.after_mm, group.held_out_mm)))
+        table.add_row(
+            escaped(group.name), *map(_number, (group.before_mm, group.after_mm, group.held_out_mm))
+        )
     overall = (result.mean_error_before_mm, result.mean_error_after_mm, result.held_out_error_mm)
     table.add_row("all", *map(_number, overall), style="bold")
     return table

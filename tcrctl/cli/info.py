@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import shlex
 from typing import TYPE_CHECKING, Any
 
+from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import LogFiles
 from tcrctl.cli.options import AsJson
 
@@ -32,11 +34,9 @@ def info(logs: LogFiles, as_json: AsJson = False) -> None:
 
 
 def _print_tables(found: LogInfo) -> None:
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
-    console = Console()
+    screen = console()
     provenance = {**found.start, **found.versions}
     for title, rows in (("", _facts(found)), ("provenance", provenance), ("criteria", _criteria(found))):
         if not rows:
@@ -45,12 +45,12 @@ def _print_tables(found: LogInfo) -> None:
         table.add_column(style="bold", no_wrap=True)
         table.add_column(overflow="fold")
         for name, value in rows.items():
-            table.add_row(escape(name), escape(str(value)))
-        console.print(table)
+            table.add_row(escaped(name), escaped(value))
+        screen.print(table)
 
 
 def _facts(found: LogInfo) -> dict[str, Any]:
-    complete = "yes" if found.complete else f"no; mend it with: tcrctl recover {found.path}"
+    complete = "yes" if found.complete else f"no; mend it with: tcrctl recover {shlex.quote(found.path)}"
     rate = f" at {found.rate_hz:.4g} Hz" if found.rate_hz else ""
     per_step = f", {found.bytes_per_step:.0f} per step" if found.bytes_per_step else ""
     return {

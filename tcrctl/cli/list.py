@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -61,7 +62,11 @@ def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:
         data = strict_yaml.load(path).data
     except InputError:
         data = None
-    values = data if isinstance(data, dict) else {"description": f"not readable; see: tcrctl validate {path}"}
+    values = (
+        data
+        if isinstance(data, dict)
+        else {"description": f"not readable; see: tcrctl validate {shlex.quote(str(path))}"}
+    )
     return {"name": name, **{key: str(values.get(key) or "") for key in keys}, "path": str(path)}
 
 

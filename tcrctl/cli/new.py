@@ -32,6 +32,7 @@ def new(
         robot = os.path.relpath(loaded.robot_path, path.parent).replace(os.sep, "/")
         text = _with_value(text, "robot", robot if "/" in robot else f"./{robot}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:

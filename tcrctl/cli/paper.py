@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tcrctl.cli.console import console, escaped
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
 
 if TYPE_CHECKING:
@@ -100,11 +101,10 @@ def _progress(count: int, *, quiet: bool) -> Iterator[Told]:
     if not sys.stderr.isatty():
         yield (lambda job: None), _Counter(count).say
         return
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=console(stderr=True), transient=True) as bar:
         task, running = bar.add_task("", total=count), dict[str, None]()
 
         def begun(job: Job) -> None:
@@ -140,17 +140,15 @@ def _say_run(run: PlannedRun, row: Row) -> None:
 
 
 def _print_table(report: Report) -> None:
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
     from tcrctl.paper.report import cells, titles
 
-    console, table = Console(), Table(box=None)
+    screen, table = console(), Table(box=None)
     for title in titles(report.lines):
         table.add_column(title, overflow="fold")
     for line, texts in zip(report.lines, cells(report.lines), strict=True):
-        table.add_row(*map(escape, texts), style=_STYLES.get(line.verdict, ""))
-    console.print(table)
-    console.print(" ".join(report.notes()), markup=False, highlight=False)
+        table.add_row(*map(escaped, texts), style=_STYLES.get(line.verdict, ""))
+    screen.print(table)
+    screen.print(" ".join(report.notes()), markup=False, highlight=False)
     print(f"report: {report.folder}")

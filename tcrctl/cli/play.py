@@ -51,7 +51,7 @@ def play(
     end; Ctrl-C ends the program. The address is printed on stdout.
 
     Examples:
-      tcrctl play logs/*_letter_t_*/log.mcap
+      tcrctl play logs/latest
       tcrctl play log.mcap --rate 5 --from 10 --loop
     """
     from tcrctl.errors import RunInterruptedError
@@ -70,7 +70,15 @@ def play(
     )
     with Interruption() as interruption:
         try:
-            play_log(log, playback, host=host, port=port, ready=_say_where, check=interruption.check)
+            play_log(
+                log,
+                playback,
+                host=host,
+                port=port,
+                ready=_say_where,
+                warn=_warn,
+                check=interruption.check,
+            )
         except RunInterruptedError as end_of_it:  # how it is meant to be ended
             raise typer.Exit(end_of_it.exit_code) from None
 
@@ -78,3 +86,7 @@ def play(
 def _say_where(server: ViewServer) -> None:
     print(server.url, flush=True)
     print(f"waiting for the Foxglove app; open {server.app_url}", file=sys.stderr, flush=True)
+
+
+def _warn(text: str) -> None:
+    print(f"warning: {text}", file=sys.stderr, flush=True)

@@ -40,10 +40,13 @@ def recover(
             "messages": result.messages,
             "attachments": result.attachments,
             "damaged_chunks": result.damaged_chunks,
+            "damages": list(result.damages),
         }
         print(json.dumps(report))
     else:
         print(result.path)
+    for damage in result.damages:
+        print(f"damaged and left out: {damage}", file=sys.stderr)
     why = "unfinished or damaged; steps may be missing" if result.lossy else "complete"
     print(f"{result.steps} steps saved, the input was {why}", file=sys.stderr)
     if result.lossy:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import LogFile
 from tcrctl.cli.options import AsJson, Overrides, unfolded
 from tcrctl.cli.progress import progress_bar
@@ -117,19 +118,17 @@ def _announce(changes: Sequence[Change]) -> None:
 
 
 def _print(found: Replay) -> None:
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
     from tcrctl.log.comparison import table
 
-    console = Console()
+    screen = console()
     facts = Table(show_header=False, box=None)
     facts.add_column(style="bold", no_wrap=True)
     facts.add_column(overflow="fold")
     for name, text in _facts(found):
-        facts.add_row(name, escape(text))
-    console.print(facts)
+        facts.add_row(name, escaped(text))
+    screen.print(facts)
     if found.deviations:
         rows = Table(
             "quantity",
@@ -142,8 +141,8 @@ def _print(found: Replay) -> None:
             box=None,
         )
         for row in table(found.deviations):
-            rows.add_row(*(escape(cell) for cell in row))
-        console.print(rows)
+            rows.add_row(*(escaped(cell) for cell in row))
+        screen.print(rows)
 
 
 def _facts(found: Replay) -> list[tuple[str, str]]:

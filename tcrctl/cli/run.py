@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tcrctl.cli.console import console, escaped
 from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, Spec, unfolded
 from tcrctl.cli.progress import progress_bar
 
@@ -226,17 +228,15 @@ def _plan_text(experiment: Experiment, path: StaticPath | None) -> str:
 
 
 def _print_summary(summary: Summary) -> None:
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
     from tcrctl.cli.run_table import rows
 
-    console = Console()
+    screen = console()
     table = Table(show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for name, text, style in rows(summary):
-        table.add_row(escape(name), escape(text), style=style)
-    console.print(table)
-    print(f"look at the log: tcrctl info {summary.log}")
+        table.add_row(escaped(name), escaped(text), style=style)
+    screen.print(table)
+    print(f"look at the log: tcrctl info {shlex.quote(str(summary.log))}")

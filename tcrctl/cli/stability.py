@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tcrctl.cli.console import console
 from tcrctl.cli.options import AsJson, Overrides, Quiet, Spec, unfolded
 from tcrctl.cli.progress import progress_bar
+from tcrctl.visible import cell
 
 if TYPE_CHECKING:
     from tcrctl.stability.report import StabilityPoint, StabilityReport
@@ -116,7 +118,7 @@ def _write(report: StabilityReport, out: Path) -> None:
         if out.suffix == ".csv":
             with out.open("w", newline="") as stream:
                 writer = csv.writer(stream)
-                writer.writerow(columns)
+                writer.writerow(map(cell, columns))
                 writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
             return
         import numpy as np
@@ -137,7 +139,6 @@ def _nothing(text: str) -> None:
 
 def _print(report: StabilityReport) -> None:
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD)
@@ -155,14 +156,14 @@ def _print(report: StabilityReport) -> None:
             _remarks(point),
             style=style,
         )
-    console = Console()
-    console.print(f"{report.spec}: {report.robot}, controller {report.controller}, {report.states} states")
-    console.print(f"inner iteration: {report.inner_iteration or 'none'}", highlight=False, markup=False)
-    console.print(table)
+    screen = console()
+    screen.print(f"{report.spec}: {report.robot}, controller {report.controller}, {report.states} states")
+    screen.print(f"inner iteration: {report.inner_iteration or 'none'}", highlight=False, markup=False)
+    screen.print(table)
     worst = report.worst
     if worst is not None:
         text = f"largest spectral radius {worst.radius:.5f} at {worst.t:.2f} s"
-        console.print(f"{text}: {'stable' if report.exit_code == 0 else 'not stable'}")
+        screen.print(f"{text}: {'stable' if report.exit_code == 0 else 'not stable'}")
 
 
 def _remarks(point: StabilityPoint) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tcrctl.cli.console import console, escaped
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
 
 if TYPE_CHECKING:
@@ -237,18 +238,16 @@ def _as_json(study: LoadedStudy, result: Done, found: Findings, folder: Path, re
 
 
 def _print_tables(found: Findings) -> None:
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
-    console = Console()
+    screen = console()
     for text in found.tables(brief=True):
         table = Table(box=None)
         for title in text.head:
-            table.add_column(escape(title), overflow="fold")
+            table.add_column(escaped(title), overflow="fold")
         for row in text.rows:
-            table.add_row(*map(escape, row))
-        console.print(table)
+            table.add_row(*map(escaped, row))
+        screen.print(table)
 
 
 @contextmanager

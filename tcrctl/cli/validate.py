@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -31,7 +32,8 @@ def validate(
     valid: list[str] = []
     for name in specs:
         try:
-            _load(name, overrides or (), robot=robot)
+            for note in _load(name, overrides or (), robot=robot):
+                print(f"note: {note}", file=sys.stderr)
             valid.append(name)
         except SpecError as error:
             problems += error.problems
@@ -46,15 +48,16 @@ def validate(
         print(json.dumps({"status": "ok", "valid": valid}))
 
 
-def _load(name: str, overrides: Sequence[str], *, robot: bool) -> None:
-    """Read a file of any kind with all its checks."""
+def _load(name: str, overrides: Sequence[str], *, robot: bool) -> Sequence[str]:
+    """Read a file of any kind with all its checks, and return what the user should know."""
     from tcrctl.config import shipped
     from tcrctl.experiment.again import load_experiment
     from tcrctl.robot.description import load_robot
+    from tcrctl.robot.doubts import doubts
 
     if robot:
-        load_robot(name, overrides=overrides)
-    elif shipped.is_identification(name):
+        return list(doubts(load_robot(name, overrides=overrides)))
+    if shipped.is_identification(name):
         from tcrctl.identify.loading import load_identification
 
         load_identification(name, overrides)
@@ -64,4 +67,5 @@ def _load(name: str, overrides: Sequence[str], *, robot: bool) -> None:
 
         planned(told_study(name, overrides))
     else:
-        load_experiment(name, overrides)
+        return load_experiment(name, overrides).notes
+    return ()

@@ -7,7 +7,10 @@ begin with ``identify_``; studies lie in ``studies/`` below them.
 
 from __future__ import annotations
 
+import difflib
+import shlex
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
 from tcrctl.errors import InputError, UnknownNameError
@@ -64,14 +67,48 @@ def find_experiment(name_or_path: str) -> Path:
     if is_identification(name_or_path):
         raise InputError(
             f"{name_or_path} is an identification, not an experiment",
-            hint=f"Start it with: tcrctl identify {name_or_path}",
+            hint=f"Start it with: tcrctl identify {shlex.quote(name_or_path)}",
         )
     if is_study(name_or_path):
         raise InputError(
             f"{name_or_path} is a study, not an experiment",
-            hint=f"Start it with: tcrctl sweep {name_or_path}",
+            hint=f"Start it with: tcrctl sweep {shlex.quote(name_or_path)}",
         )
-    return _find("experiment", name_or_path, experiments(), Path())
+    path = _find("experiment", name_or_path, experiments(), Path())
+    if path not in experiments().values():
+        _refuse_other_kinds(path)
+    return path
+
+
+def shadowed(name: str) -> Path | None:
+    """Return the file of a shipped name that also lies in the working directory, where it is not looked for."""
+    local = Path(f"{name}.yaml")
+    return local if not is_path(name) and _is_file(local) else None
+
+
+#: Sections that only files of one kind have, what those are, and what they are for.
+_SECTIONS: dict[str, tuple[str, str]] = {
+    "modules": ("a robot file", "Name it in an experiment, robot: {}; tcrctl validate --robot {} checks it."),
+    "cameras": ("a rig file", "Name it in an experiment, plant: {{kind: rig, rig: {}}}; tcrctl rig check {}"),
+    "faults": ("a fault script", "tcrctl emulate --faults {}"),
+}
+
+
+def _refuse_other_kinds(path: Path) -> None:
+    """Raise an InputError that says what a file is, if it is something else than an experiment."""
+    from tcrctl.config import strict_yaml
+
+    content, shown = strict_yaml.read(path), shlex.quote(str(path))
+    if content.startswith(b"\x89MCAP"):
+        hint = f"tcrctl run {shlex.quote(str(path.parent))} does the run again; tcrctl info {shown} shows the log."
+        raise InputError(f"{path}: this is a log, not an experiment", hint=hint)
+    try:
+        keys = _keys_in(content)
+    except InputError:
+        return  # whoever reads it says what is wrong
+    for section, (kind, use) in _SECTIONS.items():
+        if section in keys and "trajectory" not in keys:
+            raise InputError(f"{path}: this is {kind}, not an experiment", hint=use.replace("{}", shown))
 
 
 def find_identification(name_or_path: str) -> Path:
@@ -148,15 +185,54 @@ def _is_kind(kind: str, name_or_path: str, shipped: Mapping[str, Path]) -> bool:
     if not is_path(name_or_path):
         return name_or_path in shipped
     try:
-        data = strict_yaml.load(Path(name_or_path).expanduser()).data
+        return _kind_in(strict_yaml.read(Path(name_or_path).expanduser())) == kind
     except InputError:
         return False
-    return isinstance(data, dict) and data.get("kind") == kind
+
+
+def _kind_in(content: bytes) -> str:
+    """Return what a file calls itself; empty if it does not."""
+    kind = _keys_in(content).get("kind", "")
+    return kind if isinstance(kind, str) else ""
+
+
+@lru_cache(maxsize=8)
+def _keys_in(content: bytes) -> dict[str, object]:
+    """Return the top of a file; empty if it is no map. A long file is asked several times."""
+    from tcrctl.config import strict_yaml
+
+    data = strict_yaml.loads(content).data
+    return data if isinstance(data, dict) else {}
 
 
 def is_path(name_or_path: str) -> bool:
     """Tell a path (has a separator or ends in .yaml, .yml) from a shipped name."""
     return "/" in name_or_path or "\\" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
+
+
+def _missing(path: Path) -> str:
+    try:
+        is_folder = path.is_dir()
+    except OSError:
+        is_folder = False
+    return "this is a folder, not a file, and not that of a run" if is_folder else "there is no such file"
+
+
+def _file_here(name: str, folder: Path) -> str | None:
+    """Return the YAML file of a folder that a name is nearest to, if it is near to one."""
+    try:
+        stems = {path.stem: path.name for path in sorted(folder.glob("*.y*ml"))}
+    except (OSError, ValueError):
+        return None
+    close = difflib.get_close_matches(Path(name[:100]).stem, stems, n=1, cutoff=0.8)
+    return stems[close[0]] if close else None
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # for instance a name longer than any can be
+        return False
 
 
 def _by_name(folder: Path) -> dict[str, Path]:
@@ -166,9 +242,13 @@ def _by_name(folder: Path) -> dict[str, Path]:
 def _find(kind: str, name_or_path: str, shipped: Mapping[str, Path], folder: Path) -> Path:
     if is_path(name_or_path):
         path = folder / Path(name_or_path).expanduser()
-        if not path.is_file():
-            raise InputError(f"{path}: there is no such file")
+        if not _is_file(path):
+            raise InputError(f"{path}: {_missing(path)}")
         return path
     if name_or_path not in shipped:
-        raise UnknownNameError(kind, name_or_path, list(shipped))
+        error = UnknownNameError(kind, name_or_path, list(shipped))
+        here = _file_here(name_or_path, folder)
+        if here is not None:
+            error.hint = f"Did you mean {shlex.quote(here)}, which lies in this folder? Paths end in .yaml."
+        raise error
     return shipped[name_or_path]

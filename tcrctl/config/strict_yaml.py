@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from yaml.nodes import MappingNode, Node, SequenceNode
 
+from tcrctl.config.budget import MAX_BYTES, MAX_DEPTH, MAX_PROBLEMS
 from tcrctl.config.keys import Finding, Keys, dotted
 from tcrctl.config.yaml_core import Builder, compose, dumps, position
 from tcrctl.errors import InputError, Problem, SpecError
@@ -104,13 +105,17 @@ def read(path: str | Path) -> bytes:
         path: The file.
 
     Raises:
-        InputError: If it cannot be read.
+        InputError: If it cannot be read, or is larger than any file of settings or measurements.
     """
     try:
-        return Path(path).read_bytes()
+        with Path(path).open("rb") as file:
+            content = file.read(MAX_BYTES + 1)  # the size that a file tells may be wrong
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read: {reason}") from None
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{path}: larger than {MAX_BYTES} bytes, the limit of such files")
+    return content
 
 
 def load(path: str | Path) -> Document:
@@ -185,6 +190,8 @@ def override(document: Document, assignment: str) -> Document:
     where = f"--set {key}"
     if not equals or not text.strip() or not all(key.split(".")):
         raise _refused(f"--set {assignment}", "must be key=value, for instance controller.period_s=0.1")
+    if key.count(".") >= MAX_DEPTH:
+        raise _refused(f"--set {key[:60]}...", f"more than {MAX_DEPTH} keys deep")
     new = _value_of(text, where)
     made: dict[Keys, str] = {}
     data = _assigned(document.data, key.split("."), new, (), made, where)
@@ -245,13 +252,17 @@ def validate(document: Document, model: type[Model]) -> Model:
     from tcrctl.config.validation import check
 
     settings, found = check(document.data, model)
-    lost = [path for path, _ in document.broken if path is not None]
+    lost = {path for path, _ in document.broken if path is not None}
     problems = [problem for _, problem in document.broken]
     for path, message in found:
-        if not any(path[: len(prefix)] == prefix for prefix in lost):
+        if not any(path[:length] in lost for length in range(len(path) + 1)):
             problems.append(document.problem(path, message))
     if settings is None or problems:
-        raise SpecError(sorted(problems, key=_file_order))
+        problems.sort(key=_file_order)
+        if len(problems) > MAX_PROBLEMS:
+            more = Problem(document.name, "", f"further problems; the first {MAX_PROBLEMS} are listed")
+            problems = [*problems[:MAX_PROBLEMS], more]
+        raise SpecError(problems)
     return settings
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import json
 from collections.abc import Iterator
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from tcrctl.config.budget import MAX_PROBLEMS
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.unions import Tagged, kind_of, models_in
 
@@ -60,7 +62,9 @@ def check(data: Any, model: type[Model]) -> tuple[Model | None, list[Finding]]:
         # JSON, because that is where pydantic's strict mode takes a list for a tuple
         return model.model_validate_json(json.dumps(data)), []
     except ValidationError as error:
-        return None, _merged(f for e in error.errors() for f in _findings(e, data, model))
+        # one more than will be listed, so that it can be said that there are more
+        first = itertools.islice(error.errors(include_url=False), MAX_PROBLEMS + 1)
+        return None, _merged(f for e in first for f in _findings(e, data, model))
 
 
 def _merged(findings: Iterator[Finding]) -> list[Finding]:
@@ -114,7 +118,7 @@ def _shown(value: Any) -> str:
 
 
 def _closest(given: Any, allowed: list[str]) -> str:
-    close = difflib.get_close_matches(str(given), allowed, n=1)
+    close = difflib.get_close_matches(str(given)[:100], allowed, n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 

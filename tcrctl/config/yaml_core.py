@@ -14,6 +14,8 @@ import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from yaml.reader import Reader
 
+from tcrctl.config.blanks import blank_message, first_blank, outer_blank
+from tcrctl.config.budget import MAX_BYTES, MAX_DEPTH, MAX_VALUES, Budget
 from tcrctl.config.keys import Keys, dotted
 from tcrctl.errors import Problem, SpecError
 
@@ -21,8 +23,6 @@ try:
     from yaml import CSafeLoader as _BaseLoader
 except ImportError:  # PyYAML built without libyaml
     from yaml import SafeLoader as _BaseLoader  # type: ignore[assignment]
-
-MAX_DEPTH = 100  # a file nested deeper is a mistake or an attack, and would exhaust the stack
 
 _TAG = "tag:yaml.org,2002:"
 _CORE_SCHEMA = (  # YAML 1.2.2, Sec. 10.3.2
@@ -75,34 +75,54 @@ def compose(text: str, name: str) -> Node:
     Raises:
         SpecError: If the syntax is broken or there is not exactly one document.
     """
+    if len(text) > MAX_BYTES:
+        raise _refused(name, None, f"larger than {MAX_BYTES} bytes")
     _check_characters(text, name)
     try:
-        _check_depth(text, name)
+        _check_events(text, name)
         root: Node | None = yaml.compose(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
-        where = position(name, error.problem_mark or error.context_mark)
-        raise SpecError([Problem(where, "", _syntax_message(error))]) from None
+        raise _syntax_error(text, name, error) from None
     if root is None:
-        raise SpecError([Problem(f"{name}:1:1", "", "the file is empty")])
+        raise _refused(name, None, "the file is empty")
+    excess = Budget().first_excess(root)
+    if excess is not None:
+        raise _refused(name, excess[0].start_mark, excess[1])
     return root
+
+
+def _refused(name: str, mark: Any, message: str) -> SpecError:
+    return SpecError([Problem(position(name, mark), "", message)])
+
+
+def _syntax_error(text: str, name: str, error: yaml.MarkedYAMLError) -> SpecError:
+    blank = first_blank(text)
+    if blank is not None:  # YAML goes on reading, and complains further down
+        return SpecError([Problem(_place(text, name, blank), "", blank_message(text[blank]))])
+    return _refused(name, error.problem_mark or error.context_mark, _syntax_message(error))
+
+
+def _place(text: str, name: str, index: int) -> str:
+    return f"{name}:{text.count(chr(10), 0, index) + 1}:{index - text.rfind(chr(10), 0, index)}"
 
 
 def _check_characters(text: str, name: str) -> None:
     bad = Reader.NON_PRINTABLE.search(text)
     if bad:
-        line = text.count("\n", 0, bad.start()) + 1
-        column = bad.start() - text.rfind("\n", 0, bad.start())
         message = f"not YAML: character U+{ord(bad[0]):04X} is not allowed"
-        raise SpecError([Problem(f"{name}:{line}:{column}", "", message)])
+        raise SpecError([Problem(_place(text, name, bad.start()), "", message)])
 
 
-def _check_depth(text: str, name: str) -> None:
-    depth = 0
+def _check_events(text: str, name: str) -> None:
+    """Count before anything is built."""
+    depth = values = 0
     for event in yaml.parse(text, Loader=_Loader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        values += isinstance(event, yaml.NodeEvent)
         if depth > MAX_DEPTH:
-            where = position(name, event.start_mark)
-            raise SpecError([Problem(where, "", f"nested more than {MAX_DEPTH} levels deep")])
+            raise _refused(name, event.start_mark, f"nested more than {MAX_DEPTH} levels deep")
+        if values > MAX_VALUES:
+            raise _refused(name, event.start_mark, f"more than {MAX_VALUES} values")
 
 
 def _syntax_message(error: yaml.MarkedYAMLError) -> str:
@@ -155,6 +175,9 @@ class Builder:
             return [self.build(item, (*path, i)) for i, item in enumerate(node.value)]
         if not isinstance(node, ScalarNode):
             return self._refuse(node, path, f"tag {node.tag!r} is not supported")
+        blank = outer_blank(node.value) if not node.style else ""
+        if blank:
+            return self._refuse(node, path, blank_message(blank))
         try:
             return _scalar(node.tag.removeprefix(_TAG), node.value)
         except ValueError as error:

@@ -7,6 +7,7 @@ count, whatever the names mean today.
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -44,7 +45,7 @@ def _load_run(folder: Path, overrides: Sequence[str]) -> LoadedSpec:
     if not (folder / ROBOT).is_file():
         raise InputError(
             f"{folder}: the run was made by an older version and does not hold its robot's file",
-            hint=f"tcrctl run {spec} takes the robot that has its name today.",
+            hint=f"tcrctl run {shlex.quote(str(spec))} takes the robot that has its name today.",
         )
     given = {text.partition("=")[0].strip() for text in overrides}
     beside = {key: folder / name for key, name in _NAMED.items() if (folder / name).is_file()}

@@ -244,11 +244,10 @@ def _check_sample(path: StaticPath, i: int, rows: int, robot: Robot, limits: Dri
     """Raise the first limit that sample ``i`` breaks."""
     t, names = float(path.time[i]), robot.cable_names
     if path.error[i] > 1.0:
-        what = (
-            "distance of the end from its place" if rows == 3 else "error of the end pose (1 mm or 0.5 deg)"
-        )
+        turned = "" if rows == 3 else ", with 0.5 deg counted as 1 mm,"
+        what = f"distance of the end from its {'place' if rows == 3 else 'pose'}{turned}"
         hint = "The place is out of reach: make the drawing smaller, or move it towards the rest position."
-        raise InfeasibleError(t, what, path.error[i], 1.0, "mm" if rows == 3 else "of 1", hint=hint)
+        raise InfeasibleError(t, what, path.error[i], 1.0, "mm", hint=hint)
     tension, drive = path.tension[i], path.drive[i]
     low, high = int(np.argmin(tension)), int(np.argmax(tension))
     if tension[low] < limits.floor:

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from tcrctl.errors import DeviceError, LogError, StoppedError, TcrctlError
+from tcrctl.errors import DeviceError, InputError, LogError, StoppedError, TcrctlError
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.outcome import summary_of
 from tcrctl.experiment.prepare import Experiment, Notify, build_parts, build_plant, make_task, silent
@@ -36,6 +36,7 @@ from tcrctl.loop.interruption import Interruption
 from tcrctl.loop.loop import Parts, run_loop
 from tcrctl.loop.pacing import Pace, RealTime, Unpaced
 from tcrctl.loop.quiet import quiet_interpreter
+from tcrctl.loop.telling import unfailing
 from tcrctl.plant.plant import RunnablePlant
 from tcrctl.plant.rig.journal import Journal
 from tcrctl.plant.rig.operation import Operation
@@ -81,8 +82,8 @@ def run_experiment(
         out: Where the run's folder is made.
         realtime: Pace a simulated plant by the clock; a rig is always paced.
         confirmed: The operator has agreed that the rig moves; without it a rig is measured, not armed.
-        notify: Takes messages for the user.
-        progress: Takes the number of steps done and their total, after every step.
+        notify: Takes messages for the user; that it fails changes nothing.
+        progress: Takes the number of steps done and their total, after every step; as ``notify``.
         tap: Takes every message of the log, in the log's thread; see :class:`tcrctl.view.live.LiveView`.
         check: Called before every step; what it raises ends the run.
 
@@ -93,6 +94,7 @@ def run_experiment(
         DeviceError: If the run cannot be recorded or the plant not be reached; no folder is left behind.
     """
     check_writable(out)
+    notify, progress = unfailing(notify), unfailing(progress)
     realtime = realtime or experiment.paced
     with Interruption() as interruption:
 
@@ -210,18 +212,25 @@ def _recorded_run(
 def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogWriter) -> TcrctlError | None:
     """Go through all steps and leave the plant safe; return why it ended before the end, if it did."""
     failure: TcrctlError | None = None
+    started = False
     try:
         with _pace_kept(experiment, parts.pace, log):
             plant.start()
+            started = True
             run_loop(parts)
     except TcrctlError as error:
-        failure = error
+        failure = _in_mid_run(error) if started else error
     finally:
         try:
             plant.close()
         except TcrctlError as error:  # what ended the run first is the reason
             failure = failure or error
     return failure
+
+
+def _in_mid_run(error: TcrctlError) -> TcrctlError:
+    """Return an error of the input, which was right when the run began, as one of whatever has changed since."""
+    return DeviceError(str(error), hint=error.hint) if isinstance(error, InputError) else error
 
 
 def _pace_kept(experiment: Experiment, pace: Pace, log: LogWriter) -> AbstractContextManager[None]:

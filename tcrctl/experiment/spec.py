@@ -28,6 +28,7 @@ from tcrctl.plant.realistic import as_drawn
 from tcrctl.plant.rig.file import LoadedRig, load_rig
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
+from tcrctl.robot.doubts import doubts
 from tcrctl.robot.sections import Name
 from tcrctl.task.settings import TaskSettings
 from tcrctl.trajectory.settings import TrajectorySettings
@@ -223,7 +224,14 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     named = spec.plant.rig_file
     rig = None if named is None else load_rig(named, robot, path.parent)
     own = plant_robot(document, spec.plant, robot, robot_path)
+    notes = (*notes, *_which(name_or_path), *(f"robot {robot.name}: {text}" for text in doubts(robot)))
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, own, notes)
+
+
+def _which(name_or_path: str) -> Iterator[str]:
+    local = shipped.shadowed(name_or_path)
+    if local is not None:
+        yield f"{name_or_path} is the experiment that comes with the program; ./{local} in this folder is not read"
 
 
 def with_draws(spec: ExperimentSpec, cables: int, seed: int | None = None) -> ExperimentSpec:

@@ -9,9 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tcrctl.config.budget import MAX_PROBLEMS
 from tcrctl.config.keys import Keys
 from tcrctl.config.strict_yaml import Document, placed, read
 from tcrctl.errors import Problem, SpecError
+from tcrctl.visible import visible
 
 _POINT = ("point", "x_mm", "y_mm", "z_mm")
 
@@ -31,16 +33,45 @@ def read_table(path: Path, cables: Sequence[str]) -> Document:
         text = read(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SpecError([Problem(f"{path}:1:1", "", f"not UTF-8 text: {error.reason}")]) from None
-    rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
+    _check_characters(path, text.replace("\r", "\n"))
+    # A quote that is never closed would take the rest of the file for one cell.
+    rows = csv.DictReader(io.StringIO(text, newline=None), skipinitialspace=True, strict=True)
     drives = [f"drive_{name}_mm" for name in cables]
-    _check_header(path, list(rows.fieldnames or ()), ["configuration", *drives, *_POINT])
-    found, places, problems = _collect(path, rows, drives)
+    last = 1
+    try:
+        _check_header(path, list(rows.fieldnames or ()), ["configuration", *drives, *_POINT])
+        lines: list[tuple[int, dict[str, Any]]] = []
+        for row in rows:
+            last = rows.line_num + 1
+            lines.append((rows.line_num, row))
+    except csv.Error as error:
+        raise SpecError([Problem(f"{path}:{last}:1", "", _table_message(text, last, error))]) from None
+    found, places, problems = _collect(path, lines, drives)
     if problems:
-        raise SpecError(problems)
+        raise SpecError(problems[:MAX_PROBLEMS])
     return placed(str(path), {"configurations": list(found.values())}, places)
 
 
+def _check_characters(path: Path, text: str) -> None:
+    shown = visible(text)
+    if shown != text:
+        at = next(i for i, (a, b) in enumerate(zip(text, shown, strict=False)) if a != b)
+        before = text[:at].splitlines() or [""]
+        where = f"{path}:{len(before)}:{len(before[-1]) + 1}"
+        raise SpecError([Problem(where, "", f"character U+{ord(text[at]):04X} is not allowed in a table")])
+
+
+def _table_message(text: str, line: int, error: csv.Error) -> str:
+    """Return what is wrong with a table that cannot be read, from the beginning of a line on."""
+    begins = "".join(text.splitlines(keepends=True)[line - 1 : line])
+    return "a quote that is opened here is not closed" if '"' in begins else f"is no table: {error}"
+
+
 def _check_header(path: Path, given: list[str], wanted: list[str]) -> None:
+    if len(given) == 1 and any(mark in given[0] for mark in ";\t|"):
+        mark = next(mark for mark in ";\t|" if mark in given[0])
+        shown = "a tab" if mark == "\t" else mark
+        raise SpecError([Problem(f"{path}:1:1", "", f"separated by {shown} where , is needed")])
     problems = [f"column {name!r} is missing" for name in wanted if name not in given]
     problems += [
         f"unknown column {name!r}; allowed: {', '.join(wanted)}" for name in given if name not in wanted
@@ -53,14 +84,15 @@ def _check_header(path: Path, given: list[str], wanted: list[str]) -> None:
 
 
 def _collect(
-    path: Path, rows: Any, drives: list[str]
+    path: Path, lines: list[tuple[int, dict[str, Any]]], drives: list[str]
 ) -> tuple[dict[str, Any], dict[Keys, str], list[Problem]]:
     """Gather the rows of every configuration; a configuration's drives must agree in all of its rows."""
     found: dict[str, dict[str, Any]] = {}
     places: dict[Keys, str] = {}
     problems: list[Problem] = []
-    for row in rows:
-        where, name = f"{path}:{rows.line_num}:1", (row["configuration"] or "").strip()
+    indices: dict[str, int] = {}
+    for line, row in lines:
+        where, name = f"{path}:{line}:1", (row["configuration"] or "").strip()
         if None in row or None in row.values():
             problems.append(Problem(where, "", "the row has not as many cells as the header"))
             continue
@@ -70,7 +102,7 @@ def _collect(
         ]
         values = [numbers[key] for key in drives]
         entry = found.setdefault(name, {"name": name, "drives_mm": values, "points_mm": {}})
-        index, point = list(found).index(name), row["point"].strip()
+        index, point = indices.setdefault(name, len(indices)), row["point"].strip()
         places.setdefault(("configurations", index), where)
         if values != entry["drives_mm"]:
             problems.append(Problem(where, "", f"configuration {name!r} had other drive lengths before"))
@@ -86,7 +118,7 @@ def _number(where: str, key: str, text: str, problems: list[Problem]) -> float |
     if not text.strip():
         return None
     try:
-        value = float(text)
+        value = math.nan if "_" in text else float(text)  # 5_0 is a number of Python only
     except ValueError:
         value = math.nan
     if math.isfinite(value):

@@ -21,6 +21,7 @@ from tcrctl.log.codec import encode
 from tcrctl.log.event import LEVELS, Event
 from tcrctl.log.geometry import LogGeometry
 from tcrctl.log.schema import VERSION, descriptor_set, public_descriptor, units
+from tcrctl.log.seal import sealed
 from tcrctl.log.steps import StepEncoder
 from tcrctl.log.viewer_topics import TOPICS, ViewerTopics, stamp
 from tcrctl.signals import StepRecord
@@ -45,7 +46,9 @@ _CHUNK_BYTES: Final = 2**20
 def new_mcap(stream: IO[bytes], chunk_size: int = _CHUNK_BYTES) -> Writer:
     """Start a writer with the header of our logs, which ends a zstd chunk that is longer than ``chunk_size``."""
     # Offsets into the summary are optional, and mcap writes wrong ones for groups without entries.
-    writer = Writer(stream, chunk_size, CompressionType.ZSTD, use_summary_offsets=False)
+    writer = Writer(
+        stream, chunk_size, CompressionType.ZSTD, use_summary_offsets=False, enable_data_crcs=True
+    )
     writer.start(profile="", library=LIBRARY)
     return writer
 
@@ -53,7 +56,7 @@ def new_mcap(stream: IO[bytes], chunk_size: int = _CHUNK_BYTES) -> Writer:
 def _end_of_file(stop: Mapping[str, str]) -> bytes:
     """Stop record and the end of a file without index."""
     builder: Any = RecordBuilder()
-    Metadata(name=STOP, metadata=dict(stop)).write(builder)
+    Metadata(name=STOP, metadata=sealed(STOP, stop)).write(builder)
     DataEnd(data_section_crc=0).write(builder)
     Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(builder)
     return bytes(builder.end()) + MCAP0_MAGIC
@@ -97,7 +100,7 @@ class McapFile:
         for name, (media_type, data) in opening.attachments.items():
             self._writer.add_attachment(epoch_ns, epoch_ns, name, media_type, data)
         own = {"log_schema": VERSION, "epoch_ns": str(epoch_ns), "period_s": repr(period_s)}
-        self._writer.add_metadata(START, {**opening.start, **own})
+        self._writer.add_metadata(START, sealed(START, {**opening.start, **own}))
         self._schemas: dict[str, int] = {}
         self._channels = self._register(opening.geometry)
         self._events = 0
@@ -212,6 +215,6 @@ class McapFile:
     def finish(self, stop: Mapping[str, str]) -> None:
         """Write the stop record, index and footer; ``steps`` is added to the record."""
         self.flush()
-        self._writer.add_metadata(STOP, {"steps": str(self.steps), **stop})
+        self._writer.add_metadata(STOP, sealed(STOP, {"steps": str(self.steps), **stop}))
         self._writer.finish()
         self._stream.flush()

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import os
+import re
+import shlex
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from google.protobuf.message import DecodeError
-from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata
+from mcap.records import Attachment, Channel, Header, Message, Metadata
 from numpy.typing import NDArray
 
 from tcrctl.errors import InputError, LogError
@@ -20,6 +22,8 @@ from tcrctl.log.mcap_file import EVENT_TOPIC, START, STEP_TOPIC, STOP
 from tcrctl.log.scan import Scan, check_is_mcap
 from tcrctl.log.steps import StepDecoder
 from tcrctl.signals import StepRecord
+
+_USUAL_PERIOD_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +39,7 @@ class Log:
         node_names: Names of the rows of ``q``, ``base.n1, ...``; empty if no step was flushed.
         cable_names: Names of the entries of ``drive``; empty as above.
         marker_names: Names of the rows of ``Measurement.nodes``; empty as above.
+        damages: What was found damaged, if that was allowed.
     """
 
     path: Path
@@ -45,6 +50,22 @@ class Log:
     node_names: tuple[str, ...]
     cable_names: tuple[str, ...]
     marker_names: tuple[str, ...]
+    damages: tuple[str, ...] = ()
+
+    @property
+    def epoch_ns(self) -> int:
+        """Unix time of t = 0 [ns]; 0 if the log does not tell."""
+        told = self.start.get("epoch_ns", "")
+        return int(told) if re.fullmatch("[0-9]{1,19}", told) else 0
+
+    @property
+    def period_s(self) -> float:
+        """Control period [s]; that of our experiments if the log does not tell."""
+        try:
+            told = float(self.start.get("period_s", ""))
+        except ValueError:
+            return _USUAL_PERIOD_S
+        return told if 0.0 < told < math.inf else _USUAL_PERIOD_S
 
     def steps(self) -> Iterator[StepRecord]:
         """Yield every step that is whole, in the order written, with arrays equal bit for bit.
@@ -97,28 +118,38 @@ class Log:
                 channels.add(record.id)
             elif isinstance(record, Message) and record.channel_id in channels:
                 yield record
-        if self.complete and (scan.damaged_chunks or not scan.reached_end):
-            hint = f"Save the undamaged steps: tcrctl recover {self.path}"
-            raise LogError(self.path, f"is damaged: {scan.damaged_chunks} chunks cannot be read", hint=hint)
+        if scan.damages or (self.complete and not scan.reached_end):
+            raise _damaged(self.path, scan.damages)
 
 
-def read_log(path: str | os.PathLike[str]) -> Log:
+def _damaged(path: Path, damages: list[str]) -> LogError:
+    what = "; ".join(damages) or "the end is missing"
+    hint = f"Save what is undamaged: tcrctl recover {shlex.quote(str(path))}"
+    return LogError(path, f"is damaged: {what}", hint=hint)
+
+
+def read_log(path: str | os.PathLike[str], *, damaged: bool = False) -> Log:
     """Open a log.
 
     Args:
         path: An MCAP file written by :class:`tcrctl.log.writer.LogWriter`; it may end anywhere.
+        damaged: Also open one that is damaged; what is damaged is left out.
 
     Returns:
         The log, with ``complete`` False if the file has no footer or no stop record.
 
     Raises:
         InputError: If the file does not exist, or is not a log of tcrctl.
+        LogError: If it is damaged outside its chunks, or anywhere if the run was finished.
     """
     path = Path(path)
     check_is_mcap(path)
-    records, indexed = _indexed_records(path), True
-    if records is None:
-        records, indexed = list(_cut_records(path)), False
+    scan = Scan(path, chunks=False)
+    records = list(scan)
+    if scan.damages and not damaged:
+        raise _damaged(path, _named(path, scan.damages))
+    if not any(isinstance(record, Channel) for record in records):  # no index: the first chunk has them
+        records += [record for record in Scan(path) if isinstance(record, Channel)]
     metadata = {record.name: record.metadata for record in records if isinstance(record, Metadata)}
     header = next((record for record in records if isinstance(record, Header)), None)
     if START not in metadata and not (header and header.library.startswith("tcrctl/")):
@@ -129,7 +160,8 @@ def read_log(path: str | os.PathLike[str]) -> Log:
         start=metadata.get(START, {}),
         stop=metadata.get(STOP),
         attachments={a.name: (a.media_type, a.data) for a in records if isinstance(a, Attachment)},
-        complete=indexed and STOP in metadata,
+        complete=scan.indexed and STOP in metadata,
+        damages=tuple(scan.damages),
         node_names=_split(names.get("nodes", "")),
         cable_names=_split(names.get("cables", "")),
         marker_names=_split(names.get("markers", "")),
@@ -140,22 +172,9 @@ def _split(names: str) -> tuple[str, ...]:
     return tuple(names.split(",")) if names else ()
 
 
-def _indexed_records(path: Path) -> list[McapRecord] | None:
-    """Return the header, metadata, attachments and channels by way of the footer's index; None if there is none."""
-    try:
-        with open(path, "rb") as stream:
-            reader = SeekingReader(stream, record_size_limit=os.fstat(stream.fileno()).st_size)
-            summary = reader.get_summary()
-            if summary is None:
-                return None
-            found: list[McapRecord] = [reader.get_header(), *reader.iter_metadata()]
-            return [*found, *reader.iter_attachments(), *summary.channels.values()]
-    except Exception:  # what a cut file makes the reader raise has no common base
-        return None
-
-
-def _cut_records(path: Path) -> Iterator[McapRecord]:
-    """Return the header, metadata, attachments and channels of a file without index."""
-    for record in Scan(path):
-        if isinstance(record, Header | Metadata | Attachment | Channel):
-            yield record
+def _named(path: Path, damages: list[str]) -> list[str]:
+    """Return the damages with the chunks that are meant."""
+    closer = Scan(path)
+    for _ in closer:
+        pass
+    return closer.damages or damages

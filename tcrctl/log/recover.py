@@ -14,6 +14,7 @@ from tcrctl.errors import InputError, LogError
 from tcrctl.log.mcap_file import STEP_TOPIC, STOP, TRUNCATED, new_mcap
 from tcrctl.log.reader import read_log
 from tcrctl.log.scan import Scan
+from tcrctl.log.seal import sealed
 from tcrctl.log.writer import open_new
 
 
@@ -27,8 +28,9 @@ class Recovery:
         messages: Messages saved on all topics.
         attachments: Attachments saved.
         damaged_chunks: Chunks that had to be left out.
-        lossy: True if steps may be missing: the input had no stop record, the disk was full before it, or a chunk
-            was damaged.
+        lossy: True if something may be missing: the input had no stop record, the disk was full before it, or
+            something in it was damaged.
+        damages: What was damaged, each with the record.
     """
 
     path: Path
@@ -37,6 +39,7 @@ class Recovery:
     attachments: int
     damaged_chunks: int
     lossy: bool
+    damages: tuple[str, ...] = ()
 
 
 class _Copy:
@@ -67,7 +70,7 @@ class _Copy:
         elif isinstance(record, Metadata) and record.name == STOP:
             self.stop = record.metadata
         elif isinstance(record, Metadata):
-            self._writer.add_metadata(record.name, record.metadata)
+            self._writer.add_metadata(record.name, sealed(record.name, record.metadata))
 
     def _channel(self, record: Channel) -> None:
         if record.id in self._channels or record.schema_id not in self._schemas:
@@ -101,7 +104,7 @@ def recover(path: str | os.PathLike[str], out: str | os.PathLike[str]) -> Recove
         InputError: If ``path`` is not a log of tcrctl, or ``out`` exists.
         LogError: If ``out`` cannot be written; nothing is left behind.
     """
-    source, target = read_log(path).path, Path(out)
+    source, target = read_log(path, damaged=True).path, Path(out)
     try:
         stream = open_new(target)
     except FileExistsError as error:
@@ -111,6 +114,9 @@ def recover(path: str | os.PathLike[str], out: str | os.PathLike[str]) -> Recove
     try:
         with stream:
             return _recover_into(new_mcap(stream), source, target)
+    except LogError:
+        target.unlink(missing_ok=True)
+        raise
     except OSError as error:
         target.unlink(missing_ok=True)
         raise LogError(target, f"cannot be written: {error.strerror or error}") from error
@@ -123,13 +129,14 @@ def _recover_into(writer: Any, source: Path, target: Path) -> Recovery:
     scan = Scan(source)
     for record in itertools.chain(definitions, scan):
         copy.add(record)
-    lossy = copy.stop is None or TRUNCATED in copy.stop or scan.damaged_chunks > 0
+    lossy = copy.stop is None or TRUNCATED in copy.stop or bool(scan.damages)
     stop = copy.stop or {
         "status": "error",
         "reason": "not finished; recovered up to the last flush",
     }
     mark = {"recovered": "true", "steps": str(copy.steps)} if lossy else {}
     writer.flush()
-    writer.add_metadata(STOP, {**stop, **mark})
+    writer.add_metadata(STOP, sealed(STOP, {**stop, **mark}))
     writer.finish()
-    return Recovery(target, copy.steps, copy.messages, copy.attachments, scan.damaged_chunks, lossy)
+    damages = tuple(scan.damages)
+    return Recovery(target, copy.steps, copy.messages, copy.attachments, scan.damaged_chunks, lossy, damages)

@@ -112,6 +112,6 @@ def json_map(text: str | bytes) -> dict[str, Any]:
     """Return the map that a text holds as JSON; empty if it is something else."""
     try:
         found = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import os
+import shlex
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -26,6 +27,7 @@ from typing import BinaryIO, Final, Self
 from tcrctl.errors import LogError
 from tcrctl.log.event import Event
 from tcrctl.log.mcap_file import McapFile, Opening, Tap
+from tcrctl.log.whereabouts import displaced
 from tcrctl.signals import StepRecord
 
 _QUEUE_S: Final = 2.0  # a writer that lags further behind will not catch up: the disk is too slow
@@ -100,6 +102,7 @@ class LogWriter:
         self._turn, self._written = threading.Event(), threading.Event()
         self._in_turn = 0
         self._failure: Exception | None = None
+        self._displaced = ""
         self._finished = self._reported = False
         self._stream = _create(self.path, opener)
         try:
@@ -142,7 +145,8 @@ class LogWriter:
         """Write everything logged so far and metadata ``tcrctl.run.stop``, and close the file.
 
         Raises:
-            LogError: If something of it could not be written; what was flushed stays readable.
+            LogError: If something of it could not be written; what was flushed stays readable. Also if the path
+                does not lead to the file any more.
         """
         self._check()
         self._finished = True
@@ -151,6 +155,8 @@ class LogWriter:
         self._thread.join()
         if self._failure is not None:
             raise self._error(self._failure) from self._failure
+        if self._displaced:
+            raise LogError(self.path, f"is not there any more: {self._displaced}")
 
     def __enter__(self) -> Self:
         """Return the writer."""
@@ -181,7 +187,7 @@ class LogWriter:
             raise LogError(self.path, "is finished; nothing can be added")
 
     def _error(self, failure: Exception) -> LogError:
-        hint = f"Everything up to the last flush is readable: tcrctl recover {self.path}"
+        hint = f"Everything up to the last flush is readable: tcrctl recover {shlex.quote(str(self.path))}"
         return LogError(self.path, f"writing failed: {failure}", hint=hint)
 
     def _let_write(self) -> None:
@@ -200,6 +206,7 @@ class LogWriter:
         except Exception as failure:
             self._end_after(failure)
             self._failure = failure
+        self._displaced = displaced(self._stream, self.path)
         try:
             self._stream.close()
         except OSError as failure:

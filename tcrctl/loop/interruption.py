@@ -78,8 +78,11 @@ def signals_exit() -> Iterator[None]:
 
     def leave(number: int, frame: FrameType | None) -> NoReturn:
         del frame
-        print(f"stopped by {signal.Signals(number).name}", file=sys.stderr, flush=True)
-        os._exit(128 + number)
+        try:
+            if sys.stderr is not None:
+                print(f"stopped by {signal.Signals(number).name}", file=sys.stderr, flush=True)
+        finally:  # also if nobody takes the message
+            os._exit(128 + number)
 
     numbers = (signal.SIGINT, signal.SIGTERM) if _in_main_thread() else ()
     before = {number: signal.signal(number, leave) for number in numbers}

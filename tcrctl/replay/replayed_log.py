@@ -44,7 +44,7 @@ def open_replayed(out: Path, log: Log, origin: Origin, robot: Robot) -> LogWrite
         attachments={**log.attachments, **own},
         start=start,
         geometry=log_geometry(robot),
-        epoch_ns=int(log.start.get("epoch_ns", "0")),
+        epoch_ns=log.epoch_ns,
         period_s=spec.controller.period_s,
         full_state_s=spec.full_state_s,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterable, Mapping
 from html import escape
 from importlib.resources import files
@@ -64,7 +65,7 @@ def _reason(summary: Mapping[str, Any], history: History) -> str:
     reason = str(summary.get("reason", ""))
     if history.log.complete:
         return reason
-    mend = f"The log is not complete; mend it with: tcrctl recover {history.log.path}"
+    mend = f"The log is not complete; mend it with: tcrctl recover {shlex.quote(str(history.log.path))}"
     return f"{reason}. {mend}" if reason else mend
 
 

@@ -11,7 +11,8 @@ from tcrctl.robot.module import LABELS
 
 T = TypeVar("T")
 
-Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+#: Folders and files are named after it, with times and endings, and 255 bytes is all that file systems give.
+Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)]
 NodeName: TypeAlias = Annotated[str, Field(pattern=rf"^(base|m[1-9][0-9]*)\.({'|'.join(LABELS)})$")]
 JointNode: TypeAlias = Annotated[str, Field(pattern=rf"^(upper|lower)\.({'|'.join(LABELS)})$")]
 Degrees: TypeAlias = Annotated[

@@ -18,6 +18,7 @@ from tcrctl.errors import DeviceError, InputError
 from tcrctl.experiment.summary import UNITS
 from tcrctl.study.plan import PlannedRun
 from tcrctl.study.row import TIMING, Row
+from tcrctl.visible import cell
 
 #: Digits of an address in a table: enough that a million runs have different ones.
 DIGITS: Final = 16
@@ -42,7 +43,7 @@ class Table:
         """Return the table as comma-separated values: numbers with all digits, nothing for what is not there."""
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(self.columns)
+        writer.writerow(map(cell, self.columns))
         writer.writerows([_text(value) for value in row] for row in self.rows)
         return stream.getvalue()
 
@@ -72,7 +73,7 @@ def _text(value: Cell) -> str:
         return ""
     if isinstance(value, bool):
         return str(value).lower()
-    return repr(value) if isinstance(value, float) else str(value)
+    return repr(value) if isinstance(value, float) else cell(str(value))
 
 
 def _even(values: Sequence[Cell]) -> list[Cell]:

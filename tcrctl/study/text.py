@@ -12,6 +12,7 @@ from typing import Final, Literal, TypeAlias
 from tcrctl.experiment.summary import unit_of
 from tcrctl.study.groups import Difference, Group
 from tcrctl.study.statistics import Share, Spread
+from tcrctl.visible import cell
 
 Format: TypeAlias = Literal["text", "csv", "latex", "markdown"]
 FORMATS: Final[tuple[Format, ...]] = ("text", "csv", "latex", "markdown")
@@ -50,7 +51,7 @@ class TextTable:
     def csv(self) -> str:
         """Return the table as comma-separated values."""
         stream = io.StringIO()
-        csv.writer(stream, lineterminator="\n").writerows((self.head, *self.rows))
+        csv.writer(stream, lineterminator="\n").writerows(map(cell, row) for row in (self.head, *self.rows))
         return stream.getvalue()
 
     def formatted(self, form: Format) -> str:

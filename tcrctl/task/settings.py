@@ -29,7 +29,7 @@ TARGET_RESULTS: Final = (
 )
 BOX_RESULTS: Final = ("detected", "detection_s", "collision", "collision_s", "smallest_clearance_mm")
 
-Label: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+Label: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)]
 Wall: TypeAlias = Literal["left", "right", "front", "back", "bottom", "top"]
 #: Axis of the box that each wall is across, and on which side of the inside the wall is.
 WALLS: Final[dict[Wall, tuple[int, int]]] = {

@@ -200,6 +200,7 @@ def play(
     host: str = HOST,
     port: int = PORT,
     ready: Callable[[ViewServer], None] = lambda server: None,
+    warn: Callable[[str], None] = lambda text: None,
     check: Callable[[], None] = lambda: None,
 ) -> None:
     """Play a log; begins when the first viewer has connected.
@@ -210,6 +211,7 @@ def play(
         host: Address to listen at.
         port: Port to listen at; 0 takes a free one.
         ready: Takes the server when it can be connected to.
+        warn: Takes what the user should know about the log.
         check: Raises if the program shall end.
 
     Raises:
@@ -219,6 +221,8 @@ def play(
     """
     foxglove_sdk()
     tape = Tape(log_in(path), playback.topics)
+    if tape.damages:
+        warn(f"the log is damaged, what is whole is played: {'; '.join(tape.damages)}")
     player = Player(tape, playback, check=check)
     with ViewServer(
         tape.channels,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -36,6 +37,7 @@ class Tape:
         static: Messages that hold for the whole log.
         first_ns: Log time of the first message [Unix ns].
         last_ns: Log time of the last one.
+        damages: What is damaged and left out.
     """
 
     def __init__(self, path: Path, topics: Collection[str] = ()) -> None:
@@ -48,14 +50,14 @@ class Tape:
         Raises:
             InputError: If it is not a log, or has no messages.
             UnknownNameError: If it has no such topic.
-            LogError: If it is damaged inside.
+            LogError: If it would cost more than a log may.
         """
-        log = read_log(path)
-        self.path, self._complete = path, log.complete
-        self._epoch_ns = int(log.start.get("epoch_ns", "0"))
-        self.period = float(log.start.get("period_s", "0.05"))
+        log = read_log(path, damaged=True)
+        self.path, self._complete = path, log.complete and not log.damages
+        self.damages = log.damages
+        self._epoch_ns, self.period = log.epoch_ns, log.period_s
         self.static: list[Sent] = []
-        found = self._read_index() if log.complete else self._read_all()
+        found = self._read_index() if self._complete else self._read_all()
         for topic in topics:
             if topic not in found:
                 raise UnknownNameError("topic", topic, list(found))
@@ -97,10 +99,11 @@ class Tape:
                 schemas[record.id] = record
             elif isinstance(record, Channel):
                 names[record.id] = record.topic
-                found[record.topic] = _view_channel(record, schemas[record.schema_id])
+                if record.schema_id in schemas:  # else it was in a damaged chunk
+                    found[record.topic] = _view_channel(record, schemas[record.schema_id])
             elif isinstance(record, Message):
                 times.append(record.log_time)
-                if names[record.channel_id] == STATIC:
+                if names.get(record.channel_id) == STATIC:
                     self.static.append(Sent(record.log_time, STATIC, record.data))
         if not times:
             raise InputError(f"{self.path}: has nothing to play")
@@ -113,7 +116,7 @@ class Tape:
                 for _, channel, message in SeekingReader(stream).iter_messages(topics, starting_at=begin_ns):
                     yield Sent(message.log_time, channel.topic, message.data)
             except Exception as error:  # what damage makes the reader raise has no common base
-                hint = f"Save the undamaged steps: tcrctl recover {self.path}"
+                hint = f"Save the undamaged steps: tcrctl recover {shlex.quote(str(self.path))}"
                 raise LogError(self.path, f"is damaged: {error}", hint=hint) from error
 
     def _scanned(self, begin_ns: int) -> Iterator[Sent]:
@@ -122,7 +125,7 @@ class Tape:
             if isinstance(record, Channel):
                 names[record.id] = record.topic
             elif isinstance(record, Message):
-                sent = Sent(record.log_time, names[record.channel_id], record.data)
+                sent = Sent(record.log_time, names.get(record.channel_id, ""), record.data)
                 if sent.time_ns >= begin_ns and sent.topic in self._topics:
                     yield sent
 

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from tcrctl.visible import cell
 from tcrctl.workspace.workspace import Workspace
 
 #: Colours of a tilt of zero and of the largest one.
@@ -29,8 +30,8 @@ end_header
 
 def table(found: Workspace) -> str:
     """Return every point as comma-separated values, lengths in mm, tilt in deg, tensions in N."""
-    drives = [f"drive_{name}_mm" for name in found.cables]
-    tensions = [f"tension_{name}_n" for name in found.cables]
+    drives = [cell(f"drive_{name}_mm") for name in found.cables]
+    tensions = [cell(f"tension_{name}_n") for name in found.cables]
     columns = np.column_stack(
         (found.ray, 1e3 * found.offset, np.degrees(found.tilt), 1e3 * found.drive, found.tension)
     )

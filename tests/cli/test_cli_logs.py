@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from support import records
 from support.log_files import open_log
+from support.log_mutants import starts
 from tcrctl.analysis.export import export_csv, export_parquet
 from tcrctl.analysis.info import inspect
 from tcrctl.cli.export import export
@@ -260,3 +261,16 @@ def test_every_column_is_listed_with_unit_and_meaning():
 def test_export_wants_one_format(log):
     assert tcrctl("export", log)[0] == 2
     assert tcrctl("export", log, "--csv", "--npz")[0] == 2
+
+
+@pytest.mark.parametrize("form", ["--csv", "--npz", "--parquet"])
+def test_a_log_without_steps_is_an_empty_table(form, log, tmp_path):
+    data = log.read_bytes()
+    path, out = tmp_path / "killed.mcap", tmp_path / "out"
+    path.write_bytes(data[: next(at for at, code in starts(data) if code == 6)])
+    assert tcrctl("export", path, form, "-o", out)[0] == 0
+    assert out.stat().st_size > 0
+    if form == "--csv":
+        (head,) = csv.reader(out.read_text().splitlines())
+        assert "t_s" in head
+    assert tcrctl("info", path)[0] == 0

@@ -94,7 +94,7 @@ def test_new_keeps_a_robot_file_of_ones_own_in_reach(tmp_path: Path, monkeypatch
     assert load_spec("sub/second.yaml").robot_path.resolve() == Path("robots/own.yaml").resolve()
 
 
-@pytest.mark.parametrize("name", ["a b", "nowhere/x"])
+@pytest.mark.parametrize("name", ["a b", "/proc/nowhere/x"])
 def test_new_leaves_no_file_behind_when_it_fails(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

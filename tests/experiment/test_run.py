@@ -252,6 +252,23 @@ def test_a_second_ctrl_c_leaves_a_finished_log_and_a_closed_plant(short, tmp_pat
     assert len(list(log.steps())) == 8
 
 
+@pytest.mark.slow
+def test_what_fitted_at_the_start_and_does_not_later_is_a_device(tmp_path, monkeypatch, capsys):
+    failing_plant(monkeypatch, InputError("the PLC says it is another one"), write_at=0.3)
+    assert main(["run", "letter_t", "--json", "--out", str(tmp_path), *arguments()]) == 5
+    (line,) = capsys.readouterr().out.splitlines()
+    assert json.loads(line)["reason"] == "the PLC says it is another one"
+
+
+def test_nobody_who_is_told_about_a_run_can_end_it(short, tmp_path):
+    def gone(*message):
+        raise BrokenPipeError(32, "Broken pipe")
+
+    summary = run_experiment(short, out=tmp_path, notify=gone, progress=gone)
+    assert (summary.status, summary.exit_code) == ("success", 0)
+    assert read_log(summary.log).complete
+
+
 def test_a_disk_that_fills_up_is_an_error_and_the_plant_is_closed(short, tmp_path, monkeypatch):
     closed = failing_plant(monkeypatch, DeviceError("unused"))
     step = LogWriter.step

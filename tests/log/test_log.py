@@ -19,6 +19,7 @@ from tcrctl.errors import InputError, LogError, UnknownNameError
 from tcrctl.log.columns import COLUMNS, stack
 from tcrctl.log.reader import read_log
 from tcrctl.log.schema import descriptor_set, public_descriptor
+from tcrctl.log.seal import sealed
 from tcrctl.log.steps import StepDecoder, StepEncoder
 from tcrctl.log.viewer_topics import TOPICS
 from tcrctl.signals import RawFrame
@@ -116,7 +117,8 @@ def test_a_plain_mcap_reader_sees_every_step_once_in_order(finished):
     )
     assert all(message.publish_time == message.log_time - 10_000_000 for message in messages)
     assert metadata["tcrctl.run.start"]["run_id"] == records.START["run_id"]
-    assert metadata["tcrctl.run.stop"] == {"steps": "40", **STOP}
+    stop = metadata["tcrctl.run.stop"]
+    assert stop == sealed("tcrctl.run.stop", {"steps": "40", **STOP})
     assert header.profile == ""
     assert header.library.startswith("tcrctl/")
 

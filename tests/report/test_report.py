@@ -20,6 +20,7 @@ from PIL import Image
 from support import records
 from support.log_files import STOP, open_log
 from tcrctl.analysis.history import read_histories
+from tcrctl.analysis.info import inspect
 from tcrctl.cli.app import main
 from tcrctl.experiment import provenance
 from tcrctl.experiment.spec import load_spec
@@ -285,3 +286,23 @@ def test_robot_and_curves_are_drawn_in_a_browser(page, tmp_path):
     for colour in ("#6b7580", "#0072b2", "#d55e00", "#009e73"):
         wanted = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)])
         assert (np.abs(pixels.astype(int) - wanted).max(axis=1) < 12).sum() > 50, colour
+
+
+@pytest.mark.parametrize(
+    "summary",
+    [
+        {"steps": "many", "criteria": 5, "position_error_mm": ["x"], "task": [1, {"a": None}]},
+        {"steps": 3, "criteria": ["x", None], "control_ms": {"p50": {}}, "status": [], "reason": {}},
+        {"steps": None, "criteria": {"name": 1}, "tension_n": {"min": None}, "status": None},
+        [1, 2],
+    ],
+)
+def test_a_summary_of_other_types_is_no_fault_of_the_program(summary, tmp_path):
+    path = tmp_path / "log.mcap"
+    with open_log(path) as log:
+        for k in range(3):
+            log.step(records.record(k))
+        log.finish({"status": "success", "summary": json.dumps(summary)})
+    made = write_report(path, tmp_path / "page.html")
+    assert made.stat().st_size > 0
+    assert inspect(path).steps == 3

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tcrctl.cli.console import console, escaped
+
 if TYPE_CHECKING:
     from tcrctl.commissioning.finding import Finding
     from tcrctl.robot.description import RobotDescription
@@ -43,8 +45,6 @@ def print_rows(title: str, rows: dict[str, str]) -> None:
 
 def print_findings(lines: list[tuple[str, Finding]]) -> None:
     """Print what a check found, by robot."""
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
     table = Table(show_header=False, box=None)
@@ -52,5 +52,5 @@ def print_findings(lines: list[tuple[str, Finding]]) -> None:
         table.add_column(style=style, overflow="fold")
     for robot, finding in lines:
         verdict = "[green]ok[/green]" if finding.exit_code == 0 else "[red]NOT OK[/red]"
-        table.add_row(escape(robot), escape(finding.what), verdict, escape(finding.text))
-    Console().print(table)
+        table.add_row(escaped(robot), escaped(finding.what), verdict, escaped(finding.text))
+    console().print(table)

@@ -23,6 +23,7 @@ from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
 from tcrctl.config.settings import Settings
 from tcrctl.errors import DeviceError, InputError, UntrustworthyDeviceError
 from tcrctl.plant.rig.devices import DriveControl, DriveStatus
+from tcrctl.plant.rig.loopback import emulate_hint
 from tcrctl.plant.rig.settings import CableDrive, ModbusRtu, ModbusTcp, MountedRobot, SafetyRules
 
 _WRONG_FILE: Final = (MapError, PlcMismatchError, RateError)
@@ -136,7 +137,7 @@ class ModbusDrives:
         """Read the status; over a serial line, where that costs wire time, what the last exchange said."""
         if self._last is not None and not self._asks:
             return self._last
-        return self._translated(self._call(self.bus.read_status))
+        return self._translated(self._call(self.bus.read_status, moving=True))
 
     def exchange(self, target: NDArray[np.int64], control: DriveControl) -> DriveStatus:
         """Send one block and get the status; axes without a cable stay where the PLC says they are."""
@@ -144,7 +145,7 @@ class ModbusDrives:
         for axis, value in zip(self._axes, self._signs * target, strict=True):
             block[axis] = int(value)
         bits = _bits(control)
-        answer = self._call(lambda: self.bus.exchange(block, bits, self._speed))
+        answer = self._call(lambda: self.bus.exchange(block, bits, self._speed), moving=True)
         self._last = self._translated(answer)
         return self._last
 
@@ -152,15 +153,19 @@ class ModbusDrives:
         """End the connection."""
         self.bus.close()
 
-    def _call(self, action: Callable[[], Any]) -> Any:
+    def _call(self, action: Callable[[], Any], *, moving: bool = False) -> Any:
+        """Do something with the bus; a PLC that fitted the rig file and now does not has been exchanged."""
         try:
             return action()
         except _WRONG_FILE as error:
+            if moving:
+                raise UntrustworthyDeviceError(f"{self._where}: {error}", hint=error.hint) from error
             raise InputError(f"{self._where}: {error}", hint=error.hint) from error
         except _HOPELESS as error:
             raise UntrustworthyDeviceError(f"{self._where}: {error}", hint=error.hint) from error
         except HardwareError as error:
-            raise DeviceError(f"{self._where}: {error}", hint=error.hint) from error
+            hint = emulate_hint(self._where) or error.hint
+            raise DeviceError(f"{self._where}: {error}", hint=hint) from error
 
     def _translated(self, answer: Any) -> DriveStatus:
         self._raw = list(answer.positions_um)

@@ -18,6 +18,7 @@ from tcr_hardware.natnet.settings import NatNetSettings
 from tcr_hardware.rigid_transform import RigidTransform
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.devices import Sighting
+from tcrctl.plant.rig.loopback import emulate_hint
 from tcrctl.plant.rig.settings import Calibration, CameraSettings, MarkerSettings
 from tcrctl.robot.module import node_index, ring_rows
 from tcrctl.robot.robot import Robot
@@ -30,7 +31,7 @@ def device_errors(what: str) -> Iterator[None]:
     try:
         yield
     except HardwareError as error:
-        raise DeviceError(f"{what}: {error}", hint=error.hint) from error
+        raise DeviceError(f"{what}: {error}", hint=emulate_hint(str(error)) or error.hint) from error
 
 
 def client_settings(cameras: CameraSettings) -> NatNetSettings:

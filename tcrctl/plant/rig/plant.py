@@ -25,7 +25,7 @@ from tcrctl.plant.rig.drive_line import DriveLine
 from tcrctl.plant.rig.health import Health, Rules
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.set_points import ClampNotes, DriveEnvelope, Micrometres, SetPoints
-from tcrctl.plant.rig.supervisor import SafetyState, Supervisor
+from tcrctl.plant.rig.supervisor import RESET_HINT, SafetyState, Supervisor
 from tcrctl.signals import Array, Command, Measurement, Truth
 
 #: How often the drives are written to while they are armed or stopped outside the control loop [s].
@@ -173,7 +173,8 @@ class RigPlant:
                 if self._clock() - begun > self._limits.arm_timeout:
                     why = (status.fault if status else "") or "they do not say why"
                     raise ArmingRefusedError(
-                        [f"the drives are not on after {self._limits.arm_timeout:g} s: {why}"]
+                        [f"the drives are not on after {self._limits.arm_timeout:g} s: {why}"],
+                        hint=RESET_HINT if status and (status.fault or status.watchdog) else "",
                     )
                 self._sleep(CYCLE)
         except BaseException:
