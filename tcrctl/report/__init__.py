@@ -12,10 +12,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from tcrctl.analysis.history import read_histories
+from tcrctl.analysis.result import run_result
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.report.numbers import payload
 from tcrctl.report.page import page
-from tcrctl.report.summary import run_summary
 
 
 def write_report(path: Path, out: Path | None = None, *, force: bool = False) -> Path:
@@ -38,7 +38,7 @@ def write_report(path: Path, out: Path | None = None, *, force: bool = False) ->
     out = history.log.path.with_name("report.html") if out is None else out
     if out.exists() and not force:
         raise InputError(f"{out}: exists already", hint="Give another name with -o, or --force.")
-    text = page(history, run_summary(history.log), payload(history))
+    text = page(history, run_result(history.log), payload(history))
     try:
         with open(out, "w" if force else "x", encoding="utf-8") as stream:
             stream.write(text)

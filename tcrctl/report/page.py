@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -12,7 +12,9 @@ from typing import Any, Final
 
 from tcrctl import __version__
 from tcrctl.analysis.history import History
-from tcrctl.experiment.summary import UNITS
+from tcrctl.experiment.headline import Line, headline, number
+from tcrctl.experiment.judgement import judgements
+from tcrctl.experiment.task_words import findings
 from tcrctl.log.run_files import RunFiles
 
 _SCRIPTS: Final = ("data.js", "robot.js", "charts.js", "page.js")
@@ -37,7 +39,8 @@ def page(history: History, summary: Mapping[str, Any], payload: Mapping[str, Any
         reason=escape(_reason(summary, history)),
         subtitle=escape(_subtitle(start, history)),
         cards=_cards(summary),
-        criteria=_criteria(summary.get("criteria") or ()),
+        criteria=_criteria(summary),
+        further=_further(summary),
         task=_task(summary.get("task")),
         events=_events(history),
         provenance=_pairs(start),
@@ -69,61 +72,56 @@ def _reason(summary: Mapping[str, Any], history: History) -> str:
     return f"{reason}. {mend}" if reason else mend
 
 
-def _cards(summary: Mapping[str, Any]) -> str:
-    """Write every measure, with all its numbers."""
-    cards = []
-    for name in dict.fromkeys(full.partition(".")[0] for full in UNITS):
-        value = summary.get(name)
-        unit = next(u for n, u in UNITS.items() if n.partition(".")[0] == name)
-        if value is None:
-            continue
-        title = name.removesuffix(f"_{unit.replace('/', '_')}".lower()) if unit else name
-        parts = value.items() if isinstance(value, Mapping) else [("", value)]
-        numbers = "".join(
-            f"<dd>{_number(v)} {escape(unit)} <small>{escape(k)}</small></dd>" for k, v in parts
-        )
-        cards.append(f"<dl><dt>{escape(title.replace('_', ' '))}</dt>{numbers}</dl>")
-    return "".join(cards)
+def _cards(result: Mapping[str, Any]) -> str:
+    """Write the few numbers to look at first."""
+    return "".join(_card(line) for line in headline(result) if line.first)
 
 
-def _number(value: Any) -> str:
-    return escape(f"{value:.4g}" if isinstance(value, float) else str(value))
+def _card(line: Line) -> str:
+    numbers = "".join(
+        f"<dd>{escape(said)} <small>{escape(part)}</small></dd>" for part, said in line.parts.items()
+    )
+    style = ' class="trouble"' if line.trouble else ""
+    return f"<dl{style}><dt>{escape(line.name)}</dt>{numbers}</dl>"
 
 
-def _criteria(criteria: Iterable[Mapping[str, Any]]) -> str:
-    rows = []
-    for item in criteria:
-        passed = bool(item.get("passed"))
-        mark = '<td class="good">passed</td>' if passed else '<td class="bad">FAILED</td>'
-        unit = escape(str(item.get("unit") or ""))
-        value, limit = (_number(item.get(key)) for key in ("value", "limit"))
-        name = escape(str(item.get("name")))
-        rows.append(f"<tr>{mark}<td>{name}</td><td>{value} {unit}</td><td>{limit} {unit}</td></tr>")
+def _further(result: Mapping[str, Any]) -> str:
+    """Write the numbers that few people ask for."""
+    steps = {"steps": number(result.get("steps")), "duration": number(result.get("duration_s"), "s")}
+    return _pairs({**steps, **{line.name: line.text for line in headline(result) if not line.first}})
+
+
+def _criteria(result: Mapping[str, Any]) -> str:
+    rows = [
+        f'<tr><td class="{j.style}">{escape(j.verdict)}</td><td><code>{escape(j.name)}</code></td>'
+        f"<td>{escape(j.value)}</td><td>{escape(j.asked)}</td></tr>"
+        for j in judgements(result)
+    ]
     if not rows:
         return "<p>None.</p>"
-    head = "<tr><th></th><th>criterion</th><th>value</th><th>limit</th></tr>"
+    head = "<tr><th>verdict</th><th>criterion</th><th>value</th><th>must be</th></tr>"
     return f"<table>{head}{''.join(rows)}</table>"
 
 
 def _task(task: Any) -> str:
-    return f"<section><h2>Task</h2>{_nested(task)}</section>" if task else ""
+    """Write a line of words for each thing of the task; instants lead there."""
+    rows = [
+        f"<tr><th>{escape(found.subject)}</th><td>{escape(found.text)}</td><td>{_instant(found.at)}</td></tr>"
+        for found in findings(task)
+    ]
+    return f"<section><h2>Task</h2><table>{''.join(rows)}</table></section>" if rows else ""
 
 
-def _nested(value: Any) -> str:
-    """Write any JSON as nested tables."""
-    if isinstance(value, Mapping):
-        rows = (f"<tr><th>{escape(str(k))}</th><td>{_nested(v)}</td></tr>" for k, v in value.items())
-        return f"<table>{''.join(rows)}</table>"
-    if isinstance(value, list):
-        return "".join(_nested(item) for item in value)
-    return _number(value)
+def _instant(t: float | None) -> str:
+    """Write a link that sets the clock of the page."""
+    return "" if t is None else f'<a href="#t={t:.3f}">{t:.2f} s</a>'
 
 
 def _events(history: History) -> str:
     rows = [
-        f'<tr class="{escape(event.level)}"><td>{event.t:.3f} s</td><td>{escape(event.level)}</td>'
+        f'<tr class="{escape(event.level)}"><td>{_instant(event.t)}</td><td>{escape(event.level)}</td>'
         f"<td>{escape(event.kind)}</td><td>{escape(event.message)}</td></tr>"
-        for event in history.log.events()
+        for event in sorted(history.log.events(), key=lambda event: event.t)
     ]
     return f"<table>{''.join(rows)}</table>" if rows else "<p>None.</p>"
 

@@ -138,6 +138,7 @@ KEYS = [
     "orientation_error_deg",
     "theta_x_error_rad",
     "theta_y_error_rad",
+    "theta_singular_fraction",
     "tension_n",
     "saturated_fraction",
     "control_ms",
@@ -185,6 +186,7 @@ def test_criteria_are_judged_on_the_values_they_name():
     assert [item["passed"] for item in judged] == [True, False, True, False, False]
     assert judged[0] == {
         "name": "position_error_mm.max",
+        "relation": "<=",
         "limit": 3.0,
         "value": pytest.approx(2.0),
         "unit": "mm",
