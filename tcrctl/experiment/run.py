@@ -43,6 +43,8 @@ from tcrctl.plant.rig.operation import Operation
 from tcrctl.robot.module import RIGID_BARS, module_of, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import StepRecord
+from tcrctl.task.settings import TaskSettings
+from tcrctl.task.task import task_drawing
 from tcrctl.trajectory.start_blend import StartBlend
 from tcrctl.trajectory.trajectory import Trajectory
 
@@ -135,7 +137,7 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap:
             Opening(
                 attachments=attachments(loaded, spec),
                 start=start_metadata(folder.run_id, loaded, spec, realtime=realtime),
-                geometry=log_geometry(experiment.robot, experiment.trajectory),
+                geometry=log_geometry(experiment.robot, experiment.trajectory, spec.task),
                 epoch_ns=time.time_ns(),
                 period_s=experiment.period,
                 full_state_s=spec.full_state_s,
@@ -149,8 +151,10 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap:
         raise
 
 
-def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeometry:
-    """Return the names and the topology that the log needs to draw a robot, and the path of its end."""
+def log_geometry(
+    robot: Robot, trajectory: Trajectory | None = None, task: TaskSettings | None = None
+) -> LogGeometry:
+    """Return the names and the topology that the log needs to draw a robot, the path of its end, and its task."""
     model, routes = robot.model, []
     for c, name in enumerate(robot.cable_names):
         holes = slice(model.first_hole[c], model.first_hole[c + 1])
@@ -164,6 +168,7 @@ def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeome
         module_of(robot.tip),
         springs=model.bar_nodes[RIGID_BARS * robot.n_modules :],
         reference_path=np.zeros((0, 3)) if trajectory is None else trajectory.position(points),
+        drawing=task_drawing(task),
     )
 
 

@@ -11,6 +11,21 @@ from tcrctl.experiment.summary import SUFFIXES
 
 #: Words for what a list of a task holds.
 _OF_A: Final = {"targets": "target", "objects": "object"}
+#: Words for flags that are set, and that are not.
+_FLAGS: Final = {
+    "detected": ("seen", "never seen"),
+    "beam_passes": ("the beam goes through", "the beam does not go through"),
+    "collision": ("collision", "no collision"),
+}
+_NAMES: Final = {
+    "first_seen_s": "first at",
+    "detected": "objects seen:",
+    "detection_s": "all seen at",
+    "collision_s": "at",
+    "collision_between": "between",
+}
+#: Values that are instants of the run, not lengths of time.
+_INSTANTS: Final = ("first_seen_s", "collision_s", "detection_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,18 +34,18 @@ class Finding:
 
     Attributes:
         subject: What it is about: ``target level``, ``object key``; ``task`` for what is true of all.
-        facts: Texts with units by name: ``position error`` is ``0.1506 mm``.
+        facts: What was found, with units: ``position error 0.1506 mm``.
         at: When, if one of the facts is an instant [s].
     """
 
     subject: str
-    facts: Mapping[str, str]
+    facts: tuple[str, ...]
     at: float | None
 
     @property
     def text(self) -> str:
         """All facts in one line."""
-        return ", ".join(f"{name} {said}" for name, said in self.facts.items())
+        return ", ".join(self.facts)
 
 
 def findings(task: Any) -> Iterator[Finding]:
@@ -52,20 +67,19 @@ def findings(task: Any) -> Iterator[Finding]:
 
 
 def _finding(subject: str, values: Mapping[str, Any]) -> Finding:
-    facts = dict(_fact(str(key), value) for key, value in values.items() if value is not None)
-    times = [v for k, v in values.items() if k in _INSTANTS and isinstance(v, float | int)]
+    known = [(str(key), value) for key, value in values.items() if value is not None]
+    known.sort(key=lambda item: not isinstance(item[1], bool))  # what was asked comes first, then how well
+    facts = tuple(_fact(key, value) for key, value in known)
+    times = [values[key] for key in _INSTANTS if isinstance(values.get(key), float | int)]
     return Finding(subject, facts, float(times[0]) if times else None)
 
 
-#: Values that are instants of the run, not lengths of time.
-_INSTANTS: Final = ("first_seen_s", "detection_s", "collision_s")
-
-
-def _fact(key: str, value: Any) -> tuple[str, str]:
-    """Return ``position error``, ``0.1506 mm``: a key that ends in its unit gives it to the number."""
+def _fact(key: str, value: Any) -> str:
+    """Return ``position error 0.1506 mm``: a key that ends in its unit gives it to the number."""
+    if isinstance(value, bool):
+        yes, no = _FLAGS.get(key, (f"{key.replace('_', ' ')} yes", f"{key.replace('_', ' ')} no"))
+        return yes if value else no
     name, _, ending = key.rpartition("_")
-    unit = SUFFIXES.get(ending, "")
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if unit and name and is_number:
-        return name.replace("_", " "), number(float(value), unit)
-    return key.replace("_", " "), number(value)
+    unit = SUFFIXES.get(ending, "") if name and isinstance(value, int | float) else ""
+    said = number(float(value), unit) if unit else number(value)
+    return f"{_NAMES.get(key, (name if unit else key).replace('_', ' '))} {said}"
