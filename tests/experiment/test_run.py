@@ -488,7 +488,7 @@ def test_a_killed_run_keeps_all_steps_but_those_of_the_last_flush_interval(runni
     )  # missed steps are not made up for
     assert not log.complete
     assert steps == list(range(len(steps)))
-    flushed = elapsed - 0.5 - 0.3  # flush interval, and time for a busy machine
+    flushed = elapsed - 0.5 - 0.5  # flush interval, and one more: on a busy machine a flush is late, too
     assert len(steps) >= flushed / 0.05
     mended = recover(path, path.with_name("mended.mcap"))
     assert (mended.steps, mended.lossy) == (len(steps), True)
