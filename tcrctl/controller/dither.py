@@ -98,6 +98,11 @@ class Dither:
         return self.thrown is not None and self.thrown > self._settings.rubs_mm / 1e3
 
     @property
+    def slides(self) -> bool:
+        """Whether the probing wave has told that they do not."""
+        return self.thrown is not None and not self.rubs
+
+    @property
     def now(self) -> Dithered:
         """Amplitude and speed, and where the drives are in the wave."""
         fastest = 2.0 * self.amplitude / (self._half_wave * self._period)
@@ -150,7 +155,7 @@ class Dither:
         elif np.isfinite(position).all():
             self._surprise(position)
             grown = self._sizes[0] + self._period * self._rate()
-            self._sizes[0] = min(max(grown, self._least), self._most)
+            self._sizes[0] = min(max(grown, self._least), self._least if self.slides else self._most)
         self._position[:] = position
 
     def _try(self, probe: FrictionProbe, estimate: Estimate) -> None:
