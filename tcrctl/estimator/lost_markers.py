@@ -18,10 +18,8 @@ import numpy as np
 from tcrctl.estimator.carried_rings import RING, carry
 from tcrctl.signals import Measurement
 
-#: A lost marker is filled in for so long [s]; then it counts as not seen.
+#: A lost marker is filled in for so long [s]; then it counts as not seen. A ring that is lost whole begins anew.
 LONGEST: Final = 0.5
-#: The same for the markers of a ring that is lost whole: nothing but its neighbour says where it is.
-LONGEST_RING: Final = 0.1
 
 
 class LostMarkers:
@@ -30,7 +28,8 @@ class LostMarkers:
     def __init__(self, count: int, period: float) -> None:
         """Take the number of markers and the control period [s]."""
         self._period = period
-        self._missing, self._known = np.zeros(count), np.zeros(count, dtype=np.bool_)
+        self._missing, self._rings_missing = np.zeros(count), np.zeros(count // RING)
+        self._known = np.zeros(count, dtype=np.bool_)
         self._places = np.zeros((count, 3))
 
     def filled(self, measured: Measurement) -> Measurement:
@@ -40,9 +39,10 @@ class LostMarkers:
         places = measured.nodes.astype(np.float64)
         carry(self._places, places, seen, self._known)
         self._places, self._known = places, self._known | seen
-        of_seen_ring = np.repeat(seen.reshape(-1, RING).any(axis=1), RING)
-        longest = np.where(of_seen_ring, LONGEST, LONGEST_RING)
-        fill = (self._missing > 0.0) & (self._missing < longest) & self._known
+        ring_seen = seen.reshape(-1, RING).any(axis=1)
+        self._rings_missing = np.where(ring_seen, 0.0, self._rings_missing + self._period)
+        since = np.where(np.repeat(ring_seen, RING), self._missing, np.repeat(self._rings_missing, RING))
+        fill = ~seen & (since < LONGEST) & self._known
         if not fill.any():
             return measured
         nodes = np.where(fill[:, None], places, measured.nodes)

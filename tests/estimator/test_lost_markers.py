@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tcrctl.estimator.lost_markers import LONGEST, LONGEST_RING, LostMarkers
+from tcrctl.estimator.lost_markers import LONGEST, LostMarkers
 from tcrctl.numerics.rotation import matrix_from_quaternion, quaternion_exp
 from tcrctl.signals import Measurement
 
@@ -92,9 +92,13 @@ def test_after_a_while_it_counts_as_not_seen(lost):
     assert not valid[-1]
 
 
-def test_a_ring_that_is_lost_whole_is_forgotten_sooner(lost):
-    found = [lost.filled(frame(without(3, 4, 5))).valid[3:] for _ in range(round(LONGEST_RING / PERIOD) + 2)]
+def test_a_ring_that_is_lost_whole_is_filled_in_whole_and_forgotten_whole(lost):
+    """Two of three would turn it: whatever its markers did before, they come and go together."""
+    for _ in range(int(0.6 * LONGEST / PERIOD)):
+        lost.filled(frame(without(3)))
+    found = [lost.filled(frame(without(3, 4, 5))).valid[3:] for _ in range(int(LONGEST / PERIOD) + 1)]
     assert found[0].all()
+    assert all(ring.all() or not ring.any() for ring in found)
     assert not found[-1].any()
 
 
