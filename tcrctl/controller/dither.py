@@ -28,6 +28,8 @@ from tcrctl.robot.robot import Robot
 from tcrctl.robot.swing import signs
 from tcrctl.signals import Array, Estimate
 
+#: By how much larger an innovation has to be to say that cables rub that did not while they were probed.
+CONVINCING: Final = 5.0
 #: From this amplitude on a robot counts as dithered, with weights and gains of its own [m].
 AWAKE: Final = 0.5e-3
 
@@ -155,7 +157,7 @@ class Dither:
         elif np.isfinite(position).all():
             self._surprise(position)
             grown = self._sizes[0] + self._period * self._rate()
-            self._sizes[0] = min(max(grown, self._least), self._least if self.slides else self._most)
+            self._sizes[0] = min(max(grown, self._least), self._most)
         self._position[:] = position
 
     def _try(self, probe: FrictionProbe, estimate: Estimate) -> None:
@@ -167,7 +169,7 @@ class Dither:
     def _rate(self) -> float:
         """Return by how much the amplitude grows [m/s]."""
         amplitude, innovation = self._sizes
-        excess = innovation - self._settings.threshold_mm / 1e3
+        excess = innovation - self._settings.threshold_mm / 1e3 * (CONVINCING if self.slides else 1.0)
         return float(
             self._settings.growth_1_s * excess if excess > 0.0 else -amplitude / self._settings.release_s
         )
