@@ -125,6 +125,7 @@ CASES = [
     blinding("all markers not listed", missing=MARKERS),
     blinding("all markers are NaN", nan=MARKERS),
     blinding("no marker has a label", unlabelled=True),
+    blinding("a second source of frames", second_source=1.0),
     harmless("models announced anew", cameras=("change_models", NAMES)),
     harmless("stream changes to NatNet 3.1", cameras=("change_version", "3.1")),
     Case("markers renamed", ("change_models", [f"{name}?" for name in NAMES]), moving="disarmed",
@@ -191,6 +192,9 @@ class WatchedEmulators:
     rules: dict[str, Any]
     watchdog_ms: int = 200
     high_mm: float = HIGH_UM / 1e3
+    motive_settings: MotiveSettings = field(
+        default_factory=lambda: MotiveSettings(command_port=0, rate_hz=200.0)
+    )
     sent: list = field(default_factory=list)
     events: list = field(default_factory=list)
 
@@ -199,7 +203,7 @@ class WatchedEmulators:
         self.motive = MotiveEmulator(
             NAMES,
             lambda: rest + 5e-5 * random.standard_normal(rest.shape),
-            MotiveSettings(command_port=0, rate_hz=200.0),
+            self.motive_settings,
         )
         limits = PlcLimitSettings(min_um=-25_000, max_um=25_000, watchdog_ms=self.watchdog_ms)
         self.plc = PlcEmulator(PlcSettings(limits=limits))

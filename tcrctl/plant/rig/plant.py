@@ -291,6 +291,7 @@ class RigPlant:
             laggard=laggard,
             hopeless=self._line.hopeless,
             refused=self._refused,
+            doubts="" if self._seen is None else self._seen.doubts,
         )
 
     def _supervise(self) -> None:

@@ -205,6 +205,7 @@ class Supervisor:
         if health.age >= rules.stale_stop:
             return RigStopError(
                 f"no usable measurement for {1e3 * health.age:.0f} ms, limit {1e3 * rules.stale_stop:.0f} ms"
+                f"{_doubts(health)}"
             )
         if health.following > rules.following or (status is not None and status.following_error):
             return RigStopError(
@@ -247,10 +248,14 @@ def _doubt(health: Health, rules: Rules) -> str:
     if health.trouble:
         return f"no answer of the drives: {health.trouble}"
     if health.age >= rules.stale:
-        return f"no usable measurement for {1e3 * health.age:.0f} ms"
+        return f"no usable measurement for {1e3 * health.age:.0f} ms{_doubts(health)}"
     if health.refused and health.status is not None:
         return f"the PLC refused a set-point: {_refusal(health.status)}"
     return ""
+
+
+def _doubts(health: Health) -> str:
+    return f"; markers that cannot be used: {health.doubts}" if health.doubts else ""
 
 
 def _refusal(status: DriveStatus) -> str:
@@ -271,7 +276,7 @@ def _refusals(health: Health, rules: Rules) -> list[str]:
     if not status.acknowledged:
         reasons.append("the PLC does not acknowledge")
     if health.age == math.inf:
-        reasons.append("the cameras have shown no usable measurement")
+        reasons.append(f"the cameras have shown no usable measurement{_doubts(health)}")
     elif not health.age < rules.stale:
-        reasons.append(f"the newest usable measurement is {1e3 * health.age:.0f} ms old")
+        reasons.append(f"the newest usable measurement is {1e3 * health.age:.0f} ms old{_doubts(health)}")
     return reasons
