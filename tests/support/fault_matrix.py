@@ -195,6 +195,7 @@ class WatchedEmulators:
     motive_settings: MotiveSettings = field(
         default_factory=lambda: MotiveSettings(command_port=0, rate_hz=200.0)
     )
+    timeout_ms: float = 60
     sent: list = field(default_factory=list)
     events: list = field(default_factory=list)
 
@@ -243,6 +244,7 @@ class WatchedEmulators:
                                 "kind": "modbus_tcp",
                                 "host": self.plc.address[0],
                                 "port": self.plc.address[1],
+                                "timeout_ms": self.timeout_ms,
                             },
                             "cables": cables,
                             "markers": {"labels": "m{ring}.n{node}"},

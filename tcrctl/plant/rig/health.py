@@ -53,3 +53,8 @@ class Health:
     hopeless: bool = False
     refused: int = 0
     doubts: str = ""
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the drives are on, as far as is known."""
+        return self.status is not None and self.status.enabled

@@ -88,9 +88,8 @@ class RigPlant:
         self._period, self._operation, self._clock, self._sleep = period, operation, clock, sleep
         self.supervisor = Supervisor(limits.rules, operation.report)
         self._points: SetPoints | None = None
-        self._refused = 0
         self._seen: Sighting | None = None
-        self._usable_at = -np.inf
+        self._refused, self._usable_at = 0, -np.inf
         self._clamps, self._doubts = ClampNotes(operation.report), DoubtNotes(operation.report, clock)
 
     # --- the loop ---
@@ -151,7 +150,8 @@ class RigPlant:
             ArmingRefusedError: If a condition is not met; nothing has moved.
             DeviceError: If the drives are lost.
         """
-        self.supervisor.check_ready(self.look(), confirmed=self._operation.confirmed)
+        health = self.look()
+        self.supervisor.check_ready(health, confirmed=self._operation.confirmed, taken=health.enabled)
         self.arm(f"operator agreed; measurement {1e3 * self._health().age:.0f} ms old")
 
     def arm(self, cause: str) -> None:

@@ -103,17 +103,19 @@ class Supervisor:
         """Whether the drives are on because of this program."""
         return self.state in (*_MOVING, SafetyState.ZEROING, SafetyState.STOPPING)
 
-    def check_ready(self, health: Health, *, confirmed: bool) -> None:
+    def check_ready(self, health: Health, *, confirmed: bool, taken: bool = False) -> None:
         """Find out whether the drives may be armed.
 
         Args:
             health: What is known now.
             confirmed: The operator has agreed.
+            taken: Another program has enabled them.
 
         Raises:
             ArmingRefusedError: With every condition that is not met.
         """
         reasons = list(_refusals(health, self._rules))
+        reasons += ["the drives are enabled by somebody else"] if taken else []
         if not confirmed:
             reasons.append("the operator has not agreed (--yes)")
         if self.state is not SafetyState.DISARMED:
