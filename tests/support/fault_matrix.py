@@ -16,7 +16,7 @@ import numpy as np
 
 from tcr_hardware.emulators.motive import MotiveEmulator, MotiveFaults, MotiveSettings
 from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
-from tcr_hardware.emulators.plc_program import PlcLimitSettings
+from tcr_hardware.emulators.plc_limits import PlcLimitSettings
 from tcr_hardware.modbus.registers import Control
 from tcrctl.errors import TcrctlError
 from tcrctl.loop.pacing import RealTime
