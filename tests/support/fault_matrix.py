@@ -160,6 +160,10 @@ CASES = [
          stopping="faulted", says="fault", rule="now"),
     Case("a drive is jammed", plc=("jam", {"axis": 2}), moving="disarmed", says="set-point", rule="following"),
     Case("PLC power cycle", plc=("restart", {}), armed="faulted", moving="faulted", rule="silence"),
+    Case("PLC power cycle, registers survive", plc=("restart", {"keep": 1}), armed="faulted", moving="faulted",
+         rule="silence"),
+    Case("an encoder fails", plc=("encoder", {"axis": 2}), connect="disarmed", armed="faulted", moving="faulted",
+         stopping="faulted", says="fault", rule="now"),
 ]  # fmt: skip
 
 

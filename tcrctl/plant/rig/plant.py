@@ -153,6 +153,7 @@ class RigPlant:
         health = self.look()
         self.supervisor.check_ready(health, confirmed=self._operation.confirmed, taken=health.enabled)
         self.arm(f"operator agreed; measurement {1e3 * self._health().age:.0f} ms old")
+        self._measurement(self._frame())  # arming takes longer than a measurement stays fresh
 
     def arm(self, cause: str) -> None:
         """Switch the drives on and wait until they are; see :meth:`start`, which also looks at the cameras."""
@@ -230,8 +231,7 @@ class RigPlant:
         while self.supervisor.state is SafetyState.STOPPING:
             self._line.exchange(self.position(), self.supervisor.control)
             answered, now = self._line.ask(), self.position()
-            moved = before is None or bool(np.any(np.abs(now - before) > STILL))
-            before = now
+            moved, before = before is None or bool(np.any(np.abs(now - before) > STILL)), now
             health = replace(self._health(), silence=0.0) if answered else self._health()
             if self.supervisor.rest(self._clock(), health, moved=moved) is SafetyState.STOPPING:
                 self._sleep(CYCLE)
