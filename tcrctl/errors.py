@@ -253,5 +253,26 @@ class ArmingRefusedError(StoppedError):
         self.reasons = tuple(reasons)
 
 
+class NotArrivedError(StoppedError):
+    """Drives stand elsewhere than they were sent.
+
+    Attributes:
+        wanted_mm: Where they were sent (m,) [mm].
+        reached_mm: Where they are (m,) [mm].
+    """
+
+    def __init__(self, names: Sequence[str], wanted_mm: Sequence[float], reached_mm: Sequence[float]) -> None:
+        self.wanted_mm, self.reached_mm = tuple(wanted_mm), tuple(reached_mm)
+        places = ", ".join(
+            f"{name} is at {at:.3f} mm, sent to {to:.3f} mm"
+            for name, to, at in zip(names, wanted_mm, reached_mm, strict=True)
+            if abs(at - to) >= 0.05
+        )
+        super().__init__(
+            f"the drives did not arrive: {places}",
+            hint="Limits on speed or step, another program that writes, a drive that does not follow?",
+        )
+
+
 class UntrustworthyDeviceError(DeviceError):
     """A device answers, but what it says cannot be true; waiting or asking again does not help."""

@@ -59,13 +59,17 @@ def _facts(found: LogInfo) -> dict[str, Any]:
         "complete": "recovered; the end may be missing" if found.recovered else complete,
         "duration": f"{found.duration_s:.3f} s",
         "steps": f"{found.steps}{rate}, {found.lost_steps} lost, {found.unconverged_steps} unconverged",
-        "jitter": _milliseconds(found.jitter_ms),
+        "jitter": _milliseconds(found.jitter_ms) if found.paced else "none: no clock paced the run",
         "control time": _milliseconds(found.control_ms),
-        "overruns": f"{found.overruns}; lateness {_milliseconds(found.lateness_ms)}",
+        "overruns": f"{_overruns(found)}; lateness {_milliseconds(found.lateness_ms)}",
         "events": ", ".join(f"{count} {level}" for level, count in found.events.items()) or "none",
         "attachments": ", ".join(found.attachments) or "none",
         "size": f"{found.size_bytes} bytes{per_step}",
     }
+
+
+def _overruns(found: LogInfo) -> str:
+    return f"{found.overruns}, {100.0 * found.overruns / found.steps:.3g} %" if found.overruns else "0"
 
 
 def _milliseconds(spread: Spread | None) -> str:
@@ -75,8 +79,9 @@ def _milliseconds(spread: Spread | None) -> str:
 
 
 def _criteria(found: LogInfo) -> dict[str, str]:
+    failed = "open, the run was stopped" if found.stopped else "FAILED"
     return {
-        str(item.get("name")): f"{'passed' if item.get('passed') else 'FAILED'}: {item.get('value')} "
+        str(item.get("name")): f"{'passed' if item.get('passed') else failed}: {item.get('value')} "
         f"{item.get('unit') or ''}, limit {item.get('limit')}"
         for item in found.criteria
     }

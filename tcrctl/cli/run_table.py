@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from tcrctl.experiment.summary import Numbers, Summary
+    from tcrctl.experiment.summary import Measures, Numbers, Summary
 
+#: This share of overruns is no accident.
+MANY: Final = 0.05
+#: Ends of runs that say nothing about criteria.
+STOPPED: Final = ("aborted", "error")
 Row = tuple[str, str, str]
 
 
@@ -29,14 +33,27 @@ def rows(summary: Summary) -> Iterator[Row]:
     if measures.latency_ms is not None:
         yield "camera to drive", _numbers(measures.latency_ms, "ms"), ""
     yield "iterations", _numbers(measures.inner_iterations, ""), ""
-    if measures.overruns or measures.unconverged_steps:
-        text = f"{measures.overruns} overruns, {measures.unconverged_steps} unconverged steps"
-        yield "trouble", text, "yellow"
+    if measures.overruns:
+        yield (
+            "overruns",
+            _overruns(measures),
+            "yellow" if measures.overruns < MANY * measures.steps else "red",
+        )
+    if measures.unconverged_steps:
+        yield "trouble", f"{measures.unconverged_steps} unconverged steps", "yellow"
     for text in _task(summary.task):
         yield "task", text, ""
-    for verdict in summary.criteria:
+    for verdict in summary.criteria if summary.status in STOPPED else ():
+        yield "criterion", f"open, the run was stopped: so far {verdict}", "yellow"
+    for verdict in summary.criteria if summary.status not in STOPPED else ():
         result = "passed" if verdict.passed else "FAILED"
         yield "criterion", f"{result}: {verdict}", "green" if verdict.passed else "red"
+
+
+def _overruns(measures: Measures) -> str:
+    share = measures.overruns / measures.steps
+    text = f"{measures.overruns} steps, {100.0 * share:.3g} %, began or took longer than a period too late"
+    return f"{text}: this computer does not keep up" if share >= MANY else text
 
 
 def _task(task: Mapping[str, Any]) -> Iterator[str]:

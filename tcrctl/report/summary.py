@@ -36,6 +36,8 @@ def _of_known_types(found: dict[str, Any]) -> dict[str, Any]:
     """Return what of a recorded summary is what the name says; others may have written the log."""
     measures = {name.partition(".")[0] for name in UNITS}
     criteria = found.get("criteria")
+    if found.get("status") in ("aborted", "error") and isinstance(criteria, list):
+        criteria = [{**item, "passed": False} for item in criteria if isinstance(item, dict)]
     kept = {name: value for name, value in found.items() if name not in measures or _is_measure(value)}
     return {
         **kept,
