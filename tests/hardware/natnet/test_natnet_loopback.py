@@ -380,6 +380,7 @@ def test_a_second_source_of_frames_makes_both_doubtful_until_it_is_gone():
             assert all(not frame.doubt for frame in frames(client, 5))
             motive.faults.second_source = 1.0
             eventually(lambda client=client: client.newest().doubt)
+            client.drain()  # some are of before
             assert all(frame.doubt for frame in frames(client, 20))
             assert client.statistics().strangers >= 10
             assert "second source" in client.statistics().last_problem
