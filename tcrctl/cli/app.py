@@ -18,6 +18,7 @@ from tcrctl.cli.emulate import emulate
 from tcrctl.cli.export import export
 from tcrctl.cli.identify import identify
 from tcrctl.cli.info import info
+from tcrctl.cli.kinds import kinds
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.paper import paper
@@ -47,6 +48,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "workspace": workspace,
     "identify": identify,
     "list": list_shipped,
+    "kinds": kinds,
     "show": show,
     "validate": validate,
     "new": new,
@@ -65,7 +67,7 @@ VERBS: dict[str, Callable[..., None]] = {
 }
 
 #: Verbs of which nothing is left if their output cannot be written.
-ONLY_SAY = ("list", "show", "schema", "info", "runs", "diff")
+ONLY_SAY = ("list", "kinds", "show", "schema", "info", "runs", "diff")
 
 
 def _print_version(wanted: bool) -> None:
