@@ -12,13 +12,16 @@ from typing import Any, Final, TypeVar, Union
 
 from pydantic import create_model
 
+from tcrctl.config import strict_yaml
 from tcrctl.config.settings import Settings
 from tcrctl.config.strict_yaml import Document
 from tcrctl.config.unions import kind_of, models_in
 from tcrctl.controller.settings import OwnControllerSection
-from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.errors import InputError, Problem, TcrctlError
 from tcrctl.estimator.section import EstimatorSection
+from tcrctl.log.file_names import PLUGINS, RESOLVED
 from tcrctl.plant.settings import PlantSection
+from tcrctl.plugins.faults import told
 from tcrctl.plugins.groups import GROUPS, registered
 from tcrctl.plugins.origin import Origin
 from tcrctl.plugins.plugin import is_written_out, plugin_of, settings_of
@@ -52,7 +55,16 @@ class Trust:
     by_name: bool = False
 
 
-def with_plugins(document: Document, model: type[Model], trust: Trust) -> type[Model]:
+def trust_of(path: Path) -> Trust:
+    """Return whose code may run for an experiment of the user: all that it names.
+
+    Args:
+        path: Its file; in the folder of its run lie the files of its kinds.
+    """
+    return Trust(path.parent, by_name=path.name == RESOLVED and (path.parent / PLUGINS).is_file())
+
+
+def with_plugins(document: Document, model: type[Model], trust: Trust) -> tuple[type[Model], list[Problem]]:
     """Return the model of an experiment that also knows the kinds from elsewhere that it names.
 
     Args:
@@ -60,8 +72,8 @@ def with_plugins(document: Document, model: type[Model], trust: Trust) -> type[M
         model: Of an experiment with built-in kinds.
         trust: Whose code may run.
 
-    Raises:
-        SpecError: If a kind cannot be loaded, at its place in the document.
+    Returns:
+        The model, and why kinds cannot be loaded, at their places in the document.
     """
     fields: dict[str, Any] = {}
     problems: list[Problem] = []
@@ -78,9 +90,24 @@ def with_plugins(document: Document, model: type[Model], trust: Trust) -> type[M
             continue
         if found is not None:
             fields[section] = _joined(model, section, found)
-    if problems:
-        raise SpecError(problems)
-    return create_model(model.__name__, __base__=model, __doc__=model.__doc__, **fields) if fields else model
+    if fields:
+        model = create_model(model.__name__, __base__=model, __doc__=model.__doc__, **fields)
+    return model, problems
+
+
+def validated(document: Document, model: type[Model]) -> Model:
+    """Return the experiment that a document describes.
+
+    Raises:
+        SpecError: If it has problems.
+        InputError: If a validator from elsewhere raises what none may.
+    """
+    try:
+        return strict_yaml.validate(document, model)
+    except TcrctlError:
+        raise
+    except Exception as error:
+        raise InputError(f"{document.name}: its settings could not be checked: {told(error, '')}") from error
 
 
 def built_in(model: type[Settings], section: str) -> dict[str, type[Settings]]:

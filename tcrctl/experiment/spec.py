@@ -11,25 +11,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding
 from tcrctl.config.kind_switch import without_former_keys
 from tcrctl.config.settings import Settings, quantity, refuse
 from tcrctl.controller.settings import ControllerSettings
-from tcrctl.errors import InputError, Problem, SpecError, TcrctlError
+from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
 from tcrctl.experiment.calibration_file import with_calibration
 from tcrctl.experiment.criterion import CriterionText
 from tcrctl.experiment.plant_robot import plant_robot
-from tcrctl.experiment.plugged import Trust, with_plugins
+from tcrctl.experiment.plugged import trust_of, validated, with_plugins
 from tcrctl.experiment.summary import TASK, UNITS
-from tcrctl.log.file_names import PLUGINS, RESOLVED
 from tcrctl.plant.realistic import as_drawn
 from tcrctl.plant.rig.file import LoadedRig, load_rig
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
-from tcrctl.plugins.faults import told
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.doubts import doubts
 from tcrctl.robot.sections import Name
@@ -219,7 +217,7 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     document = strict_yaml.loads(given, str(path))
     written = document.data
     document, problems = _overridden(document, overrides)
-    model, unknown = experiment_model(document, Trust(path.parent, by_name=_was_run(path)))
+    model, unknown = with_plugins(document, ExperimentSpec, trust_of(path))
     problems += unknown
     document, notes = without_former_keys(document, written, model)
     spec, robot, robot_path = _validated(document, path.parent, problems, model)
@@ -231,29 +229,6 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     own = plant_robot(document, spec.plant, robot, robot_path)
     notes = (*notes, *_which(name_or_path), *(f"robot {robot.name}: {text}" for text in doubts(robot)))
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, own, notes)
-
-
-def experiment_model(
-    document: strict_yaml.Document, trust: Trust
-) -> tuple[type[ExperimentSpec], list[Problem]]:
-    """Return what an experiment has to be, with the kinds from elsewhere that it names.
-
-    Args:
-        document: The experiment.
-        trust: Whose code may run.
-
-    Returns:
-        The model, and what is wrong with those kinds; then the model has the built-in ones only.
-    """
-    try:
-        return with_plugins(document, ExperimentSpec, trust), []
-    except SpecError as error:
-        return ExperimentSpec, list(error.problems)
-
-
-def _was_run(path: Path) -> bool:
-    """Tell whether an experiment lies in the folder of its run, which holds the files of its kinds."""
-    return path.name == RESOLVED and (path.parent / PLUGINS).is_file()
 
 
 def _which(name_or_path: str) -> Iterator[str]:
@@ -295,14 +270,10 @@ def _validated(
     """Return experiment and robot, or raise the problems of both after those already known."""
     robot, robot_path = None, Path()
     try:
-        spec = strict_yaml.validate(document, model)
+        spec = validated(document, model)
     except SpecError as error:
         known = {problem.key for problem in problems}
         problems += [problem for problem in error.problems if problem.key not in known]
-    except (TcrctlError, ValidationError):
-        raise
-    except Exception as error:  # a validator of settings from elsewhere
-        raise InputError(f"{document.name}: its settings could not be checked: {told(error, '')}") from error
     name = document.data.get("robot") if isinstance(document.data, dict) else None
     if isinstance(name, str) and name:
         try:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from tcrctl.config import strict_yaml
-from tcrctl.errors import InputError
-from tcrctl.experiment.plugged import Trust, with_plugins
+from tcrctl.errors import InputError, SpecError
+from tcrctl.experiment.plugged import Trust, validated, with_plugins
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, misfits
 from tcrctl.log.file_names import RESOLVED, ROBOT, SPEC
 from tcrctl.log.reader import Log
@@ -82,7 +82,10 @@ def _loaded(
     overrides: tuple[str, ...],
     trust: Trust,
 ) -> LoadedSpec:
-    spec = strict_yaml.validate(document, with_plugins(document, ExperimentSpec, trust))
+    model, problems = with_plugins(document, ExperimentSpec, trust)
+    if problems:
+        raise SpecError(problems)
+    spec = validated(document, model)
     document.refuse(misfits(spec, robot))
     place = Path(files.place(""))
     return LoadedSpec(spec, robot, files.content(SPEC), place / SPEC, place / ROBOT, overrides)
