@@ -23,6 +23,7 @@ from tcrctl.errors import InputError
 from tcrctl.experiment.plant_robot import description_of_plant
 from tcrctl.experiment.plugged import origins
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
+from tcrctl.experiment.table_file import table_file
 from tcrctl.log.file_names import (
     CAMERAS,
     DESIGNED,
@@ -77,6 +78,7 @@ def own_files(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, bytes]:
         files[RIG] = loaded.rig.given
     for name, (_, content) in plugin_files(spec).items():
         files[name.removeprefix(PLUGIN_FILE)] = content
+    files |= table_file(spec.trajectory)
     named = isinstance(spec.plant, SimulatedSettings) and isinstance(spec.plant.robot, str)
     if named and loaded.plant_robot is not None:
         files[DESIGNED] = strict_yaml.dumps(loaded.plant_robot.model_dump(mode="json")).encode()
@@ -101,6 +103,7 @@ def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str
         **rig,
         **_drawn(loaded, spec),
         **plugin_files(spec),
+        **{name: ("application/octet-stream", data) for name, data in table_file(spec.trajectory).items()},
         VERSIONS: ("application/json", json.dumps(versions(), indent=2).encode()),
     }
 

@@ -25,6 +25,7 @@ from tcrctl.experiment.criterion import CriterionText
 from tcrctl.experiment.plant_robot import plant_robot
 from tcrctl.experiment.plugged import trust_of, validated, with_plugins
 from tcrctl.experiment.summary import TASK, UNITS
+from tcrctl.experiment.table_file import with_table
 from tcrctl.plant.realistic import as_drawn
 from tcrctl.plant.rig.file import LoadedRig, load_rig
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
@@ -223,7 +224,8 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     spec, robot, robot_path = _validated(document, path.parent, problems, model)
     document.refuse(misfits(spec, robot))
     estimator = with_calibration(document, spec.estimator, robot)
-    spec = spec.model_copy(update={"estimator": estimator})
+    trajectory = with_table(document, spec.trajectory)
+    spec = spec.model_copy(update={"estimator": estimator, "trajectory": trajectory})
     named = spec.plant.rig_file
     rig = None if named is None else load_rig(named, robot, path.parent)
     own = plant_robot(document, spec.plant, robot, robot_path)

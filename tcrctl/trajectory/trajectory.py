@@ -22,6 +22,8 @@ from tcrctl.trajectory.scan import build_scan
 from tcrctl.trajectory.section import TrajectorySection
 from tcrctl.trajectory.settings import HoldSettings, StrokesSettings, TrajectorySettings
 from tcrctl.trajectory.strokes import build_strokes
+from tcrctl.trajectory.table import build_table
+from tcrctl.trajectory.table_settings import TableSettings
 from tcrctl.trajectory.targets import Targets, with_targets
 from tcrctl.trajectory.waypoints import build_waypoints
 
@@ -61,6 +63,7 @@ KINDS: Final[Mapping[str, tuple[type[TrajectorySection], Callable[[Any, Robot], 
     "scan": (ScanSettings, build_scan),
     "drives": (DrivesSettings, build_drives),
     "excitation": (ExcitationSettings, build_excitation),
+    "table": (TableSettings, build_table),
 }
 
 NO_TARGETS: Targets = {}
