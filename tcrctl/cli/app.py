@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from tcrctl import __version__
+from tcrctl.caches.flags import set_flags
 from tcrctl.cli.diff import diff
 from tcrctl.cli.emulate import emulate
 from tcrctl.cli.export import export
@@ -150,13 +151,8 @@ def _with_delivery(code: int, given: list[str], output: Output) -> int:
 
 
 def _prepare_process(environment: MutableMapping[str, str]) -> None:
-    """Set what libraries read when they are loaded.
-
-    Threads for the small matrices of a control step would only wait for each other. The kernels gain nothing from
-    the compiler's higher levels, and a cold start is a fifth shorter without them.
-    """
-    environment.setdefault("OPENBLAS_NUM_THREADS", "1")
-    environment.setdefault("NUMBA_OPT", "1")
+    """Set what libraries read when they are loaded."""
+    set_flags(environment)
     for size in ("COLUMNS", "LINES"):  # 0 stands for unknown, and would be taken for no room at all
         if environment.get(size, "1").strip("0") == "":
             del environment[size]

@@ -6,7 +6,7 @@ SPEC (name or path) -> strict YAML -> --set -> ExperimentSpec + RobotDescription
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -214,7 +214,20 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
         InputError: If a file is missing.
     """
     path = shipped.find_experiment(name_or_path)
-    given = strict_yaml.read(path)
+    return read_spec(strict_yaml.read(path), path, overrides, shipped.notes(name_or_path))
+
+
+def read_spec(
+    given: bytes, path: Path, overrides: Sequence[str] = (), known: Iterable[str] = ()
+) -> LoadedSpec:
+    """Read an experiment from its text, and its robot.
+
+    Args:
+        given: The text.
+        path: Where it is from, for messages and relative paths.
+        overrides: As for :func:`load_spec`, which raises the same.
+        known: What the user should know already.
+    """
     document = strict_yaml.loads(given, str(path))
     written = document.data
     document, problems = _overridden(document, overrides)
@@ -229,14 +242,8 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
     named = spec.plant.rig_file
     rig = None if named is None else load_rig(named, robot, path.parent)
     own = plant_robot(document, spec.plant, robot, robot_path)
-    notes = (*notes, *_which(name_or_path), *(f"robot {robot.name}: {text}" for text in doubts(robot)))
+    notes = (*notes, *known, *(f"robot {robot.name}: {text}" for text in doubts(robot)))
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, own, notes)
-
-
-def _which(name_or_path: str) -> Iterator[str]:
-    local = shipped.shadowed(name_or_path)
-    if local is not None:
-        yield f"{name_or_path} is the experiment that comes with the program; ./{local} in this folder is not read"
 
 
 def with_draws(spec: ExperimentSpec, cables: int, seed: int | None = None) -> ExperimentSpec:
