@@ -7,8 +7,6 @@ from typing import Any
 
 from tcrctl.config.strict_yaml import Document
 from tcrctl.errors import InputError, SpecError
-from tcrctl.trajectory.table import table_samples
-from tcrctl.trajectory.table_files import read_bytes
 from tcrctl.trajectory.table_settings import TableSettings
 
 #: Where it stands in an experiment.
@@ -27,6 +25,9 @@ def with_table(document: Document, trajectory: Any) -> Any:
     """
     if not isinstance(trajectory, TableSettings):
         return trajectory
+    from tcrctl.trajectory.table import table_samples  # heavy
+    from tcrctl.trajectory.table_files import read_bytes
+
     folder = Path() if document.is_override(KEYS) else Path(document.name).parent
     path = folder / Path(trajectory.file).expanduser()
     try:
