@@ -167,6 +167,19 @@ class SafetyLimitError(StoppedError):
         self.unit = unit
 
 
+class PluginStoppedError(StoppedError):
+    """Code from elsewhere failed while it ran, or returned what cannot be used.
+
+    Attributes:
+        plugin: Section and kind.
+        cause: What it did.
+    """
+
+    def __init__(self, plugin: str, cause: str) -> None:
+        super().__init__(f"stopped by {plugin}: {cause}")
+        self.plugin, self.cause = plugin, cause
+
+
 class TimeLimitError(StoppedError):
     """A run took longer than it may.
 
