@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.analysis.result import run_result
+from tcrctl.analysis.result import paced, run_result
 from tcrctl.log.reader import Log, read_log
 from tcrctl.log.run_files import RunFiles, json_map
+from tcrctl.loop.measured_time import begun
 
 _COLUMNS = ("k", "t", "period", "timing_lateness")
 
@@ -40,13 +41,14 @@ class LogInfo:
         reason: Why, or empty.
         steps: Steps that can be read.
         lost_steps: Step indices missing between 0 and the last one.
-        duration_s: Time that the steps cover [s].
+        paced: Whether the clock paced the run; the following times are then measured ones, else those of the steps.
+        duration_s: Time from the first step to the end of the last one [s].
         rate_hz: Mean step rate [Hz].
-        period_s: Control period [s].
-        jitter_ms: Deviation of successive step times from the period.
+        period_s: Median time between two steps [s].
+        jitter_ms: Deviation of the time between two steps from the control period.
         overruns: Steps that began late by more than a period or took longer than one; 0 if not paced.
         lateness_ms: By how much.
-        control_ms: Duration of estimator and controller.
+        control_ms: Duration of estimator and controller, as in ``run --json``.
         unconverged_steps: Steps in which controller or estimator found no solution.
         events: Number of events by level.
         attachments: Names of the attached files.
@@ -65,6 +67,7 @@ class LogInfo:
     reason: str
     steps: int
     lost_steps: int
+    paced: bool
     duration_s: float
     rate_hz: float | None
     period_s: float | None
@@ -82,7 +85,7 @@ class LogInfo:
 
     @property
     def criteria(self) -> list[dict[str, Any]]:
-        """Criteria of the run with value and verdict, as in ``run --json``."""
+        """Criteria of the run with value and verdict, as in ``run --json``; a stopped run has passed none."""
         found: list[dict[str, Any]] = self.result["criteria"]
         return found
 
@@ -116,7 +119,7 @@ def inspect(path: str | os.PathLike[str]) -> LogInfo:
         status=stop.get("status", ""),
         reason=stop.get("reason", ""),
         steps=steps,
-        **_timing(columns),
+        **_timing(columns, paced=paced(log)),
         **_measures(log),
         events=dict(Counter(event.level for event in log.events())),
         attachments=list(log.attachments),
@@ -126,21 +129,22 @@ def inspect(path: str | os.PathLike[str]) -> LogInfo:
     )
 
 
-def _timing(columns: dict[str, NDArray[Any]]) -> dict[str, Any]:
-    k = columns["k"]
-    t = columns["t"]
+def _timing(columns: dict[str, NDArray[Any]], *, paced: bool) -> dict[str, Any]:
+    k, t, period = columns["k"], columns["t"], columns["period"]
     lateness = columns["timing_lateness"]
     if not len(k):
-        empty = {"rate_hz": None, "period_s": None, "jitter_ms": None, "lateness_ms": None}
-        return {"lost_steps": 0, **empty}
-    gaps, elapsed = np.diff(k), np.diff(t)
-    deviation = np.abs(elapsed - columns["period"][:-1])[gaps == 1]
-    span = float(t[-1] - t[0])
+        empty = dict.fromkeys(("rate_hz", "period_s", "jitter_ms", "lateness_ms"))
+        return {"lost_steps": 0, "paced": paced, **empty}
+    at = begun(t, lateness, period) if paced else t
+    neighbours = np.diff(k) == 1
+    between = np.diff(at)[neighbours]
+    span = float(at[-1] - at[0])
     return {
         "lost_steps": int(k.max()) + 1 - len(np.unique(k)),
+        "paced": paced,
         "rate_hz": float(k[-1] - k[0]) / span if span > 0.0 else None,
-        "period_s": float(np.median(columns["period"])),
-        "jitter_ms": _spread(deviation),
+        "period_s": float(np.median(between if paced and len(between) else period)),
+        "jitter_ms": _spread(np.abs(between - period[:-1][neighbours])),
         "lateness_ms": _spread(lateness),
     }
 

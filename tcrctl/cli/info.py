@@ -61,12 +61,16 @@ def _facts(found: LogInfo) -> dict[str, Any]:
         "complete": "recovered; the end may be missing" if found.recovered else complete,
         "duration": f"{found.duration_s:.3f} s",
         "steps": f"{found.steps}{rate}, {found.lost_steps} lost, {found.unconverged_steps} unconverged",
-        "jitter": _milliseconds(found.jitter_ms),
-        "overruns": f"{found.overruns}; lateness {_milliseconds(found.lateness_ms)}",
+        "jitter": _milliseconds(found.jitter_ms) if found.paced else "none: no clock paced the run",
+        "overruns": f"{_overruns(found)}; lateness {_milliseconds(found.lateness_ms)}",
         "events": ", ".join(f"{count} {level}" for level, count in found.events.items()) or "none",
         "attachments": ", ".join(found.attachments) or "none",
         "size": f"{found.size_bytes} bytes{per_step}",
     }
+
+
+def _overruns(found: LogInfo) -> str:
+    return f"{found.overruns}, {100.0 * found.overruns / found.steps:.3g} %" if found.overruns else "0"
 
 
 def _milliseconds(spread: Spread | None) -> str:

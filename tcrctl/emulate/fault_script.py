@@ -33,7 +33,7 @@ _DEFAULTS = MotiveFaults()
 _CHANGES = {"version": "", "renamed": False}
 CAMERA_FAULTS = (*(field.name for field in dataclasses.fields(MotiveFaults)), *_CHANGES)
 #: Camera faults that are shares of all frames.
-SHARES = ("loss", "duplicate", "corrupt", "truncate", "wrong_size")
+SHARES = ("loss", "duplicate", "corrupt", "truncate", "wrong_size", "second_source")
 #: Camera faults that name markers.
 MARKERS = ("occluded", "missing", "nan", "swap")
 #: A drive that moves faster than this between two looks is moving [um].

@@ -28,6 +28,8 @@ _NAMES: Final[Mapping[str, tuple[str, bool]]] = {
     "overruns": ("overruns", False),
     "unconverged_steps": ("unconverged steps", False),
 }
+#: This share of overruns is no accident.
+_MANY: Final = 0.05
 #: Counts that matter first if they are not 0.
 _TROUBLE: Final = ("overruns", "unconverged_steps")
 
@@ -100,6 +102,13 @@ def _parts(key: str, value: Any, result: Mapping[str, Any]) -> Mapping[str, str]
         return {"": f"not defined in {number(share, '%')} of the steps, where the end looks along x"}
     if key == "saturated_fraction":
         return {"": number(100.0 * float(value), "% of the steps")}
+    if key == "overruns" and value and result.get("steps"):
+        return {"": _overruns(value, value / result["steps"])}
     if not isinstance(value, Mapping):
         return {"": number(value, UNITS.get(key, ""))}
     return {part: number(found, UNITS.get(f"{key}.{part}", "")) for part, found in value.items()}
+
+
+def _overruns(count: int, share: float) -> str:
+    text = f"{count} steps, {100.0 * share:.3g} %, began or took longer than a period too late"
+    return f"{text}: this computer does not keep up" if share >= _MANY else text

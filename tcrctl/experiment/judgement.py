@@ -1,4 +1,4 @@
-"""Criteria in words. A run that was stopped has kept a criterion only until then, which is no success."""
+"""Criteria in words. Those of a run that was stopped are open, whatever the values were until then."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from tcrctl.experiment.headline import number
 
 #: What a run says of itself that has gone on to its end.
 FINISHED: Final = ("success", "failed")
+#: What one says that was ended before its time.
+STOPPED: Final = ("aborted", "error")
+_OPEN: Final = "open"
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +24,7 @@ class Judgement:
         value: What it was, with its unit.
         relation: How it is compared; empty if the log does not say.
         limit: With what, with its unit.
-        verdict: ``passed``, ``FAILED``, or ``kept until the stop``.
+        verdict: ``passed``, ``FAILED``, or ``open``.
         style: ``good``, ``bad``, or ``quiet`` for neither.
     """
 
@@ -40,10 +43,14 @@ class Judgement:
     @property
     def text(self) -> str:
         """Verdict, value and what was asked, for a place that has the name already."""
-        return f"{self.verdict}: {self.value}, must be {self.asked}"
+        return f"{self._said} {self.value}, must be {self.asked}"
+
+    @property
+    def _said(self) -> str:
+        return f"{_OPEN}, the run was stopped: so far" if self.verdict == _OPEN else f"{self.verdict}:"
 
     def __str__(self) -> str:
-        return f"{self.verdict}: {self.name} is {self.value}, must be {self.asked}"
+        return f"{self._said} {self.name} is {self.value}, must be {self.asked}"
 
 
 def judgements(result: Mapping[str, Any]) -> Iterator[Judgement]:
@@ -61,9 +68,9 @@ def judgements(result: Mapping[str, Any]) -> Iterator[Judgement]:
 
 
 def _verdict(passed: bool, finished: bool) -> tuple[str, str]:
-    if not passed:
-        return "FAILED", "bad"
-    return ("passed", "good") if finished else ("kept until the stop", "quiet")
+    if not finished:
+        return _OPEN, "quiet"
+    return ("passed", "good") if passed else ("FAILED", "bad")
 
 
 def _shown(value: Any, unit: str) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 from tcrctl.experiment.singular import is_singular
 from tcrctl.experiment.spread import spread
 from tcrctl.experiment.summary import Measures, Numbers
+from tcrctl.loop.measured_time import beyond
 from tcrctl.numerics.rotation import angle_between, angles_from_normal
 from tcrctl.signals import Array, StepRecord
 
@@ -25,6 +26,8 @@ _COLUMNS = (
     "control",
     "latency",
     "overrun",
+    "busy",
+    "lateness",
     "iterations",
     "unsolved",
 )
@@ -62,7 +65,7 @@ class Metrics:
         error = np.stack([table[f"error_{axis}"] for axis in "xyz"], axis=1)
         return Measures(
             steps=self._steps,
-            duration_s=self._steps * self._period,
+            duration_s=self._steps * self._period + self._beyond(table),
             position_error_mm=spread(1e3 * np.linalg.norm(error, axis=1), "max", "rms", "mean"),
             x_error_mm=spread(1e3 * error[:, 0], "max", "rms"),
             orientation_error_deg=spread(np.degrees(table["angle"]), "max", "rms"),
@@ -77,6 +80,11 @@ class Metrics:
             inner_iterations=spread(table["iterations"], "mean", "max"),
             unconverged_steps=int(np.sum(table["unsolved"])),
         )
+
+    def _beyond(self, table: dict[str, Array]) -> float:
+        """Return how much longer the run took than its periods [s]; nothing if no clock paced it."""
+        period = np.full(self._steps, self._period)
+        return beyond(table["lateness"], table["busy"], period) if self._paced else 0.0
 
     def _tension(self, table: dict[str, Array]) -> Numbers:
         if not self._steps:
@@ -121,7 +129,7 @@ def _timing(step: StepRecord, paced: bool) -> tuple[float, ...]:
     took = step.timing
     busy = took.read + took.estimate + took.control + took.write
     overrun = paced and max(took.lateness, busy) > step.period
-    return took.estimate + took.control, _latency(step, busy), float(overrun)
+    return took.estimate + took.control, _latency(step, busy), float(overrun), busy, took.lateness
 
 
 def _latency(step: StepRecord, busy: float) -> float:

@@ -23,12 +23,14 @@ from tcrctl.experiment.plant_robot import description_of_plant
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, with_draws
 from tcrctl.loop.loop import Parts, run_loop, step_count
 from tcrctl.loop.safety import SafetyGuard, SafetyLimits
+from tcrctl.plant.own import OwnPlant
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.realistic import rehearsal_plant
 from tcrctl.plant.rig.assembly import build_rig
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
+from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot import pose
 from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot, build_robot
@@ -191,9 +193,14 @@ def build_plant(
 
     Raises:
         DeviceError: If it cannot be reached.
-        InputError: If a rig does not do what its file says.
+        InputError: If a rig does not do what its file says, or one from elsewhere cannot be built.
     """
     settings = experiment.spec.plant
+    plugin = plugin_of(settings)
+    if plugin is not None:
+        spec = experiment.spec
+        own = OwnPlant(settings, plugin, experiment.robot, experiment.period, spec.seed)
+        return own, None
     _, build = PLANTS[settings.kind]
     return build(settings, experiment, operation or Operation())
 

@@ -105,7 +105,7 @@ def run_experiment(
             check()
 
         pace = RealTime(experiment.period, checked) if realtime else Unpaced(checked)
-        journal = Journal(pace.time, notify)
+        journal = Journal(pace.moment, notify)
         plant, state = build_plant(experiment, Operation(pace.time, journal.report, confirmed))
         try:
             parts, start_offset = build_parts(experiment, plant, state)
@@ -205,7 +205,7 @@ def _recorded_run(
         try:
             if failure is not None:
                 kind = "limit" if isinstance(failure, StoppedError) else "stop"
-                log.event(summary.measures.duration_s, kind, "error", str(failure))
+                log.event(parts.pace.moment(), kind, "error", str(failure))
             stop = {"status": summary.status, "reason": summary.reason}
             log.finish({**stop, "summary": json.dumps(summary.as_json())})
         except LogError as error:
@@ -226,6 +226,7 @@ def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogW
     except TcrctlError as error:
         failure = _in_mid_run(error) if started else error
     finally:
+        parts.pace.end()
         try:
             plant.close()
         except TcrctlError as error:  # what ended the run first is the reason

@@ -58,7 +58,7 @@ class Verdict:
         limit: The limit.
         value: The value; None if the run did not produce it, which fails the criterion.
         unit: Unit of both.
-        passed: The verdict.
+        passed: The verdict; false if the run did not come to its end, whatever the value.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Measures:
 
     Attributes:
         steps: Steps that were recorded.
-        duration_s: Time they cover [s].
+        duration_s: Time they took by the clock that paced them [s]; without one, the time they cover.
         position_error_mm: Distance of the end from where it was wanted: ``max``, ``rms``, ``mean``.
         x_error_mm: Its x component: ``max``, ``rms``.
         orientation_error_deg: Angle between end normal and wanted one: ``max``, ``rms``.

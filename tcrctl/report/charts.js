@@ -75,7 +75,7 @@ class Chart {
     c.font = "11px system-ui, sans-serif"; c.lineWidth = 1; c.fillStyle = quiet; c.strokeStyle = grid;
     c.textAlign = "right"; c.textBaseline = "middle";
     const [rows, digits] = ticks(low, high, 4), [columns, decimals] = ticks(span.from, span.to, Math.max(3, this.width / 90));
-    for (const v of rows) { const y = this.y(v); c.beginPath(); c.moveTo(LEFT, y); c.lineTo(this.width - RIGHT, y); c.stroke(); c.fillText(fixed(v, digits), LEFT - 6, y); }
+    for (const v of rows) { const y = this.y(v); c.beginPath(); c.moveTo(LEFT, y); c.lineTo(this.width - RIGHT, y); c.stroke(); c.fillText(fixed(v, digits), LEFT - 6, y, LEFT - 7); }
     c.textAlign = "center"; c.textBaseline = "top";
     for (const t of columns) { const x = this.x(t); c.beginPath(); c.moveTo(x, TOP); c.lineTo(x, this.height - BOTTOM); c.stroke(); c.fillText(t.toFixed(decimals) + " s", Math.min(x, this.width - 16), this.height - BOTTOM + 4); }
   }

@@ -33,9 +33,10 @@ def _criteria_line(result: Result) -> Line | None:
     judged = list(judgements(result))
     if not judged:
         return None
-    kept = sum(judgement.style != "bad" for judgement in judged)
-    word = "passed" if result.get("status") in FINISHED else "kept until the stop"
-    return Line("criteria", {word: f"{kept} of {len(judged)}"}, True, trouble=kept < len(judged))
+    if result.get("status") not in FINISHED:
+        return Line("criteria", {"the run was stopped": f"{len(judged)} open"}, True)
+    kept = sum(judgement.style == "good" for judgement in judged)
+    return Line("criteria", {"passed": f"{kept} of {len(judged)}"}, True, trouble=kept < len(judged))
 
 
 def _card(line: Line) -> str:

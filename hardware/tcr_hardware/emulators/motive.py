@@ -171,7 +171,6 @@ class MotiveEmulator:
             self.ticks(now),
             self.ticks(received),
             self.ticks(sent),
-            sent - received,
             flags,
         )
         return stamp, self.tracked.view(self._positions(), self.faults)
@@ -197,6 +196,8 @@ class MotiveEmulator:
                 1.0 / self.settings.rate_hz,
                 self.faults,
             )
+            if self._outbox.happens(self.faults.second_source):
+                self.link.send_as_stranger(encoded[key], destination)
         self.frames_sent += bool(encoded)
 
     def _encode(self, version: Version, flags: int, stamp: Stamp, view: View) -> bytes:

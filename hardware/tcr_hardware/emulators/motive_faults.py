@@ -26,6 +26,7 @@ class MotiveFaults:
         missing: Markers that are not seen and not listed.
         nan: Markers at no position at all.
         swap: Pairs of markers whose labels are exchanged.
+        second_source: Share of frames that come from another port of the same computer too.
         offset_m: All markers jump by this [m].
     """
 
@@ -45,4 +46,5 @@ class MotiveFaults:
     missing: frozenset[str] = frozenset()
     nan: frozenset[str] = frozenset()
     swap: tuple[tuple[str, str], ...] = ()
+    second_source: float = 0.0
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
