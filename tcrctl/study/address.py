@@ -22,8 +22,8 @@ from tcrctl.experiment.spec import LoadedSpec, with_draws
 _PACKAGE: Final = Path(__file__).parents[1]
 #: Parts of the program that stand above experiments, or beside them: they cannot change a number.
 ABOVE: Final = (
-    "analysis", "caches", "cli", "commissioning", "emulate", "executors", "identify", "paper", "plots", "replay",
-    "report", "stability", "study", "tune", "view", "workspace",
+    "analysis", "api", "caches", "cli", "commissioning", "emulate", "executors", "extend", "identify", "paper",
+    "plots", "replay", "report", "stability", "study", "tune", "view", "workspace",
 )  # fmt: skip
 #: Packages that kernels and numbers are made with.
 _NUMERIC: Final = ("llvmlite", "numba", "numpy", "scipy")
@@ -69,5 +69,5 @@ def _sources() -> Iterator[tuple[str, bytes]]:
     for root in roots:
         for path in sorted(root.rglob("*.py")):
             place = path.relative_to(root)
-            if root != _PACKAGE or place.parts[0] not in ABOVE:
+            if root != _PACKAGE or place.parts[0].removesuffix(".py") not in ABOVE:
                 yield f"{root.name}/{place.as_posix()}", path.read_bytes()
