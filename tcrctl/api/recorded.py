@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.errors import InputError
+from tcrctl.experiment.run_folder import log_in
 from tcrctl.log.event import Event
 from tcrctl.log.file_names import RESOLVED
 from tcrctl.log.reader import Log, read_log
@@ -106,8 +107,7 @@ def load(path: str | os.PathLike[str]) -> Run:
         InputError: If there is no log.
         LogError: If it is damaged.
     """
-    found = Path(path)
-    run = Run(found / "log.mcap" if found.is_dir() else found)
+    run = Run(log_in(Path(path)))
     run.log  # noqa: B018  # what is wrong with it is said here
     return run
 

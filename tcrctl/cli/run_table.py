@@ -12,10 +12,6 @@ from tcrctl.experiment.task_words import findings
 if TYPE_CHECKING:
     from tcrctl.experiment.summary import Summary
 
-#: This share of overruns is no accident.
-MANY: Final = 0.05
-#: Ends of runs that say nothing about criteria.
-STOPPED: Final = ("aborted", "error")
 Row = tuple[str, str, str]
 
 _COLOURS: Final = {"good": "green", "bad": "red", "quiet": "yellow"}

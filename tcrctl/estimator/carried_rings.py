@@ -7,17 +7,14 @@ upward every ring is complete before the next one asks for it.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tcrctl.numerics.rotation import cross, matrix_from_quaternion, norm, rotation_between
+from tcrctl.numerics.rotation import matrix_from_quaternion, norm, rotation_between
+from tcrctl.robot.module import RING
+from tcrctl.robot.ring_axes import axes_of
 from tcrctl.signals import Array
-
-#: Markers of one ring.
-RING: Final = 3
 
 
 @njit(cache=True)
@@ -43,7 +40,7 @@ def carry(before: Array, now: Array, seen: NDArray[np.bool_], known: NDArray[np.
         for i in range(RING):
             if not there[i]:
                 found[i] = carried[i]
-        turn, old, new = _turn(_axes(ring), _axes(found)), _centre(ring), _centre(found)
+        turn, old, new = _turn(axes_of(ring), axes_of(found)), _centre(ring), _centre(found)
 
 
 @njit(cache=True)
@@ -78,18 +75,6 @@ def _moved(turn: Array, old: Array, new: Array, point: Array) -> Array:
 def _centre(ring: Array) -> Array:
     centre: Array = (ring[0] + ring[1] + ring[2]) / RING
     return centre
-
-
-@njit(cache=True)
-def _axes(ring: Array) -> Array:
-    """Return the axes of a ring, one per row: x along its first side, z its normal."""
-    side = ring[1] - ring[0]
-    normal = cross(side, ring[2] - ring[0])
-    axes = np.empty((3, 3))
-    axes[0] = side / norm(side)
-    axes[2] = normal / norm(normal)
-    axes[1] = cross(axes[2], axes[0])
-    return axes
 
 
 @njit(cache=True)

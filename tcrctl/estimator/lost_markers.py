@@ -15,7 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from tcrctl.estimator.carried_rings import RING, carry
+from tcrctl.estimator.carried_rings import carry
+from tcrctl.robot.module import RING
 from tcrctl.signals import Measurement
 
 #: A lost marker is filled in for so long [s]; then it counts as not seen. A ring that is lost whole begins anew.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
 import importlib.metadata
 import json
 import os
@@ -37,6 +36,7 @@ from tcrctl.log.file_names import (
 )
 from tcrctl.plant.cameras import draw_cameras
 from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plugins.source import package_digest
 from tcrctl.robot.module import ring_rows
 
 #: Before the name of an attached file of code.
@@ -180,11 +180,8 @@ def processor() -> str:
 
 @cache
 def source_digest() -> str:
-    """Return the SHA-256 over the names and contents of all Python files of the package."""
-    digest, package = hashlib.sha256(), Path(__file__).parents[1]
-    for path in sorted(package.rglob("*.py")):
-        digest.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
+    """Return the digest of this program's Python files."""
+    return package_digest(Path(__file__).parents[1])
 
 
 def start_metadata(

@@ -43,12 +43,11 @@ def built(origin: Origin, build: Callable[..., Any], *given: Any) -> Any:
     Raises:
         InputError: If it raises anything that is no error of this program.
     """
-    try:
-        return build(*given)
-    except TcrctlError:
-        raise
-    except (Exception, SystemExit) as error:
-        raise InputError(f"{origin.what}: building it raised {told(error, origin.file)}") from error
+    return _guarded(
+        lambda error: InputError(f"{origin.what}: building it raised {told(error, origin.file)}"),
+        build,
+        *given,
+    )
 
 
 def called(origin: Origin, name: str, function: Callable[..., Any], *given: Any) -> Any:
@@ -63,12 +62,21 @@ def called(origin: Origin, name: str, function: Callable[..., Any], *given: Any)
     Raises:
         PluginStoppedError: If it raises anything that is no error of this program.
     """
+    return _guarded(
+        lambda error: PluginStoppedError(origin.what, f"{name} raised {told(error, origin.file)}"),
+        function,
+        *given,
+    )
+
+
+def _guarded(meant: Callable[[BaseException], TcrctlError], function: Callable[..., Any], *given: Any) -> Any:
+    """Call code of others; what it raises becomes the error that is meant, unless it is one of this program."""
     try:
         return function(*given)
     except TcrctlError:
         raise
     except (Exception, SystemExit) as error:
-        raise PluginStoppedError(origin.what, f"{name} raised {told(error, origin.file)}") from error
+        raise meant(error) from error
 
 
 def refuse_lacking(origin: Origin, made: Any, names: tuple[str, ...]) -> None:

@@ -98,13 +98,19 @@ def _distribution(top: str) -> tuple[str, str]:
 
 
 def _digest(top: str) -> str:
-    """Return the SHA-256 over names and contents of the Python files of a package that is imported."""
+    """Return the digest of an imported package, or of a module that is none; empty if it has no file."""
     file = getattr(sys.modules.get(top), "__file__", None)
     if not file or not Path(file).is_file():
         return ""
-    root, digest = Path(file), hashlib.sha256()
+    root = Path(file)
     if root.name != "__init__.py":
         return hashlib.sha256(root.read_bytes()).hexdigest()
-    for path in sorted(root.parent.rglob("*.py")):
-        digest.update(str(path.relative_to(root.parent)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return package_digest(root.parent)
+
+
+def package_digest(folder: Path) -> str:
+    """Return the SHA-256 over names and contents of all Python files of a package."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(str(path.relative_to(folder)).encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()

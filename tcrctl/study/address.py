@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from tcrctl.experiment.plugged import origins
 from tcrctl.experiment.spec import LoadedSpec, with_draws
-from tcrctl.trajectory.table_settings import TableSettings
+from tcrctl.experiment.table_file import table_file
 
 _PACKAGE: Final = Path(__file__).parents[1]
 #: Parts of the program that stand above experiments, or beside them: they cannot change a number.
@@ -48,19 +48,12 @@ def address(loaded: LoadedSpec, seed: int, *, random_path: bool) -> str:
         "spec": {key: value for key, value in spec.items() if key not in _WORDS},
         "robot": loaded.robot.model_dump(mode="json"),
         "plant_robot": loaded.plant_robot and loaded.plant_robot.model_dump(mode="json"),
-        "files": [origin.sha256 for origin in origins(loaded.spec)] + _samples(loaded),
+        "files": [origin.sha256 for origin in origins(loaded.spec)],
+        "samples": [hashlib.sha256(data).hexdigest() for data in table_file(loaded.spec.trajectory).values()],
         "random_path": random_path,
         "program": program(),
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _samples(loaded: LoadedSpec) -> list[str]:
-    """Return the digest of the samples of a path, if it has some: the file counts by what is in it."""
-    trajectory = loaded.spec.trajectory
-    if not isinstance(trajectory, TableSettings):
-        return []
-    return [hashlib.sha256(trajectory.content).hexdigest()]
 
 
 @cache

@@ -8,7 +8,7 @@ Other columns are left out.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -67,23 +67,21 @@ class Columns:
     Attributes:
         place: Name of the file.
         values: Columns (n,) by name as it is written.
-        first_line: Line of the first row; 0 if the file has no lines, then rows are counted from 1.
+        lines: Line of every row; empty if the file has no lines, then rows are counted from 1.
     """
 
     place: str
     values: Mapping[str, Array]
-    first_line: int
+    lines: Sequence[int] = ()
 
     def problem(self, row: int, column: str, message: str) -> Problem:
         """Return what is wrong with a row, from 0."""
-        where = (
-            f"{self.place}:{row + self.first_line}:1" if self.first_line else f"{self.place}: row {row + 1}"
-        )
+        where = f"{self.place}:{self.lines[row]}:1" if self.lines else f"{self.place}: row {row + 1}"
         return Problem(where, column, message)
 
     def header(self, message: str) -> SpecError:
         """Return what is wrong with the columns."""
-        return SpecError([Problem(f"{self.place}:1:1" if self.first_line else self.place, "", message)])
+        return SpecError([Problem(f"{self.place}:1:1" if self.lines else self.place, "", message)])
 
 
 def samples_of(table: Columns, largest_gap: float, speed_limit: float) -> Samples:

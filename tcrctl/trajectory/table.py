@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -70,8 +70,13 @@ def table_samples(settings: TableSettings) -> Samples:
     """
     if not settings.content:
         raise InputError(f"trajectory.file: {settings.file}: is empty, or not at hand")
-    table = columns_of(settings.content, settings.file)
-    return samples_of(table, settings.largest_gap, MM * settings.speed_limit_mm_s)
+    return _read(settings.content, settings.file, settings.largest_gap, MM * settings.speed_limit_mm_s)
+
+
+@lru_cache(maxsize=1)
+def _read(content: bytes, file: str, largest_gap: float, speed_limit: float) -> Samples:
+    """Read a table once, though its section is checked before it is built."""
+    return samples_of(columns_of(content, file), largest_gap, speed_limit)
 
 
 def build_table(settings: TableSettings, robot: Robot) -> TableTrajectory:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tcrctl.config.budget import MAX_PROBLEMS
+from tcrctl.config.csv_table import CsvTable, number_in
 from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.signals import Array
 from tcrctl.trajectory.samples import Columns
@@ -56,31 +56,25 @@ def columns_of(content: bytes, name: str) -> Columns:
 
 
 def _csv(content: bytes, name: str) -> Columns:
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise SpecError([Problem(f"{name}:1:1", "", f"not UTF-8 text: {error.reason}")]) from None
-    rows = csv.reader(io.StringIO(text, newline=None), skipinitialspace=True, strict=True)
+    table = CsvTable(content, name)
+    header = table.header
+    if table.separator is not None:
+        raise SpecError([Problem(f"{name}:1:1", "", "columns must be separated by commas")])
+    if len(set(header)) != len(header):
+        twice = next(cell for cell in header if header.count(cell) > 1)
+        raise SpecError([Problem(f"{name}:1:1", "", f"column {twice!r} stands there twice")])
     problems: list[Problem] = []
+    lines: list[int] = []
     numbers: list[list[float]] = []
-    header: list[str] = []
-    try:
-        header = next(rows, [])
-        if len(header) == 1 and any(mark in header[0] for mark in ";\t|"):
-            raise SpecError([Problem(f"{name}:1:1", "", "columns must be separated by commas")])
-        if len(set(header)) != len(header):
-            twice = next(cell for cell in header if header.count(cell) > 1)
-            raise SpecError([Problem(f"{name}:1:1", "", f"column {twice!r} stands there twice")])
-        for row in rows:
-            numbers.append(_row(row, header, f"{name}:{rows.line_num}:1", problems))
-            if len(problems) >= MAX_PROBLEMS:
-                break
-    except csv.Error as error:
-        raise SpecError([Problem(f"{name}:{rows.line_num}:1", "", f"is no table: {error}")]) from None
+    for line, cells in table.rows():
+        lines.append(line)
+        numbers.append(_row(cells, header, f"{name}:{line}:1", problems))
+        if len(problems) >= MAX_PROBLEMS:
+            break
     if problems:
         raise SpecError(problems)
     values = np.array(numbers, dtype=float).reshape(len(numbers), len(header))
-    return Columns(name, dict(zip(header, values.T, strict=True)), 2)
+    return Columns(name, dict(zip(header, values.T, strict=True)), tuple(lines))
 
 
 def _row(row: list[str], header: list[str], where: str, problems: list[Problem]) -> list[float]:
@@ -88,21 +82,19 @@ def _row(row: list[str], header: list[str], where: str, problems: list[Problem])
     if len(row) != len(header):
         problems.append(Problem(where, "", f"has {len(row)} cells; the header has {len(header)}"))
         return [math.nan] * len(header)
-    found = []
-    for column, cell in zip(header, row, strict=True):
-        try:
-            found.append(math.nan if "_" in cell else float(cell))
-        except ValueError:
-            found.append(math.nan)
-        if not math.isfinite(found[-1]):
-            problems.append(Problem(where, column, f"must be a finite number, not {cell.strip()[:40]!r}"))
+    found = [number_in(cell) for cell in row]
+    problems += [
+        Problem(where, column, f"must be a finite number, not {cell.strip()[:40]!r}")
+        for column, cell, number in zip(header, row, found, strict=True)
+        if math.isnan(number)
+    ]
     return found
 
 
 def _npz(content: bytes, name: str) -> Columns:
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:  # a pickle would be a program
-            return Columns(name, _vectors({key: arrays[key] for key in arrays.files}, name), 0)
+            return Columns(name, _vectors({key: arrays[key] for key in arrays.files}, name))
     except InputError:
         raise
     except Exception as error:  # whatever zipfile and numpy find wrong
@@ -120,7 +112,7 @@ def _parquet(content: bytes, name: str) -> Columns:
         arrays = {column: table.column(column).to_numpy() for column in table.column_names}
     except Exception as error:  # whatever pyarrow finds wrong
         raise InputError(f"{name}: is no Parquet file: {error}") from None
-    return Columns(name, _vectors(arrays, name), 0)
+    return Columns(name, _vectors(arrays, name))
 
 
 def _vectors(arrays: dict[str, Array], name: str) -> dict[str, Array]:

@@ -55,6 +55,7 @@ SAME = {
     "npz": section(npz_of(t_s=T, x_mm=X, y_mm=Y, z_mm=Z, note_1=T), "path.npz"),
     "Parquet": section(parquet_of(t_s=T, x_mm=X, y_mm=Y, z_mm=Z), "path.parquet"),
     "time from elsewhere": section(csv_of(t=T + 1e4)),
+    "empty lines": section(csv_of().replace(b"\n", b"\r\n\r\n")),
 }
 
 
@@ -128,6 +129,12 @@ MALFORMED = {
     ),
     "mm for m": (csv_of("t_s,x_m,y_m,z_m"), r"path\.csv:\d+:1: is \d+\.\d+ m away; is that in mm\?"),
     "few": (b"\n".join(csv_of().split(b"\n")[:4]), r"path\.csv:1:1: has 3 rows; a path needs at least 4"),
+    "open quote": (changed(7, '0.5,"1,0,0'), r"path\.csv:7:1: a quote that is opened here is not closed"),
+    "a character that acts": (
+        changed(7, "0.5,1\x1b[2J,0,0"),
+        r"path\.csv:7:6: character U\+001B is not allowed",
+    ),
+    "after an empty line": (changed(7, "\n0.5,nan,0,0"), r"path\.csv:8:1: x_mm: must be a finite number"),
     "long normal": (
         csv_of("t_s,x_mm,y_mm,z_mm,nx,ny,nz", values=np.hstack((CIRCLE, np.tile([0, 0, 1.1], (41, 1))))),
         r"path\.csv:2:1: nx: its length must be 1, not 1\.1",
