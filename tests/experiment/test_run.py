@@ -262,6 +262,7 @@ def test_what_fitted_at_the_start_and_does_not_later_is_a_device(tmp_path, monke
     assert json.loads(line)["reason"] == "the PLC says it is another one"
 
 
+@pytest.mark.slow
 def test_nobody_who_is_told_about_a_run_can_end_it(short, tmp_path):
     def gone(*message):
         raise BrokenPipeError(32, "Broken pipe")

@@ -264,6 +264,7 @@ def chromium(page, *options, hash_="", size=(1300, 1500)):
     return done.stdout
 
 
+@pytest.mark.slow
 @in_browser
 def test_slider_curves_robot_and_keys_work_together_in_a_browser(page, tmp_path):
     copy = tmp_path / "used.html"
@@ -294,6 +295,7 @@ def overlap(a, b):
     return across > 0.5 and min(a["bottom"], b["bottom"]) - max(a["top"], b["top"]) > 0.5
 
 
+@pytest.mark.slow
 @in_browser
 @pytest.mark.parametrize("size", [(1400, 900), (500, 900)])
 @pytest.mark.parametrize("runs", [1, 2])
@@ -322,6 +324,7 @@ def test_nothing_covers_anything_and_the_stage_is_in_view(page, tmp_path, size, 
         assert max(found[part]["right"] for part in parts) <= 400
 
 
+@pytest.mark.slow
 @in_browser
 def test_robot_and_curves_are_drawn_in_a_browser(page, tmp_path):
     picture = tmp_path / "page.png"

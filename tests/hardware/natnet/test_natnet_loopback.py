@@ -275,6 +275,7 @@ def test_a_frozen_stream_grows_old():
         assert client.wait_next(frozen, 2.0) is not None
 
 
+@pytest.mark.slow
 def test_a_restarted_server_is_found_again_in_unicast_and_multicast():
     for way in (WAYS[0], WAYS[2].values[0] if multicast_works() else WAYS[1]):
         with linked({"silence_s": 0.2}, **way) as (motive, client):
@@ -373,6 +374,7 @@ def test_packets_of_another_computer_are_not_believed():
         assert "127.0.0.2" in client.statistics().last_problem
 
 
+@pytest.mark.slow
 def test_a_second_source_of_frames_makes_both_doubtful_until_it_is_gone():
     """One port of the server's computer is its own; whoever sends from another may be anybody."""
     for way in ({"multicast": False}, {"multicast": True}):
