@@ -29,6 +29,7 @@ from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.plan import Situation
 from tcrctl.controller.prediction_settings import MultiStepSettings
 from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning, present
+from tcrctl.controller.slip import Slip, follow_slip, no_slip
 from tcrctl.controller.tension_gap import TensionGap
 from tcrctl.memory import POSITION, SPEED, Kept
 from tcrctl.robot import linear, pose, response
@@ -56,6 +57,7 @@ class MultiStepMemory(NamedTuple):
         drag: Drag of the dithered holes.
         friction: Their friction (n_holes, 3), columns as in ``elements.rubbing_cable``.
         share: How much of the drag that it gives there is.
+        slip: What that drag follows.
     """
 
     at: StaticMap
@@ -65,26 +67,28 @@ class MultiStepMemory(NamedTuple):
     drag: HoleDrag
     friction: Array
     share: DragShare
+    slip: Slip
 
 
 @njit(cache=True, error_model="numpy")
-def _dragged(model: Model, ws: Workspace, memory: MultiStepMemory, now: Now, turn: float) -> Array:
+def _dragged(model: Model, ws: Workspace, memory: MultiStepMemory, turn: float) -> Array:
     """Return by what usual drag displaces the point that the robot vibrates about (n_free,) [m]."""
     force, moved = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
     if turn > 0.0:
-        drag_force(model, memory.drag, now.v, now.speed, force)
+        drag_force(model, memory.drag, memory.slip.v, memory.slip.speed, force)
         linear.solve(ws, force, moved)
     return moved
 
 
 @njit(cache=True, error_model="numpy")
-def _told(model: Model, ws: Workspace, memory: MultiStepMemory, now: Now) -> Array:
+def _told(model: Model, ws: Workspace, memory: MultiStepMemory) -> Array:
     """Return the same for a robot that follows its drives at once (n_free,) [m]: no noise of cameras is in it."""
-    v, force, moved = np.zeros(now.v.shape[0]), np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
+    speed, force, moved = memory.slip.speed, np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
+    v = np.zeros(memory.v.shape[0])
     for k in range(force.shape[0]):
-        for c in range(now.speed.shape[0]):
-            v[3 * FIXED + k] += memory.at.gain[k, c] * now.speed[c]
-    drag_force(model, memory.drag, v, now.speed, force)
+        for c in range(speed.shape[0]):
+            v[3 * FIXED + k] += memory.at.gain[k, c] * speed[c]
+    drag_force(model, memory.drag, v, speed, force)
     linear.solve(ws, force, moved)
     return moved
 
@@ -107,9 +111,9 @@ def _update_offset(
             j = SIZE * (i + 1) + b
             force[k] += model.mass[i, row, b] * ((v[j] - memory.v[j]) / period + model.damping * v[j])
     linear.solve(ws, force, lag)
-    dragged = _dragged(model, ws, memory, now, tuning.turn)
+    dragged = _dragged(model, ws, memory, tuning.turn)
     if tuning.turn > 0.0:
-        told = _told(model, ws, memory, now)
+        told = _told(model, ws, memory)
         learn(memory.share, tuning.learning, _end(deviation, lag, tip), _end(np.zeros(v.shape[0]), told, tip))
     else:
         forget(memory.share, tuning.learning)
@@ -164,6 +168,8 @@ def forecast(
         deviation[k] = q[k] - at.equilibrium[k]
         finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
     fill_hole_drag(model, at.equilibrium, ws, memory.friction, tuning.turn, memory.drag)
+    if finite:
+        follow_slip(memory.slip, now.speed, v, tuning.period, tuning.drives.lag, tuning.follow)
     if outcome.converged and tuning.blend > 0.0 and finite:
         _update_offset(model, ws, memory, deviation, now, tip, tuning)
     for hole in range(memory.drag.coefficient.shape[0]):  # what is not learnt is not counted
@@ -171,10 +177,10 @@ def forecast(
     for k in range(q.shape[0]):
         memory.v[k] = v[k]
         away[k] = deviation[k] - memory.offset[k]
-    release = response.Release(away, v)
-    change, stable = response.respond(
-        model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis, memory.drag
-    )
+    held = np.zeros(ws.r.shape[0])
+    drag_force(model, memory.drag, memory.slip.v, memory.slip.speed, held)
+    release, drag = response.Release(away, v), response.Drag(memory.drag, held, tuning.follow)
+    change, stable = response.respond(model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis, drag)
     with_lag(change, grid.ahead[0], tuning.drives, now.behind, now.queue)
     free, gain = superpose(change, now.outputs, grid.edges)
     return outcome, stable, free, gain
@@ -187,7 +193,9 @@ class MultiStep:
         """Take a ``prediction:`` section, the control period [s], the robot, the drives' dead time [s]."""
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
-        self._tuning = make_tuning(period, settings.filter_s)._replace(learning=learning(period))
+        self._tuning = make_tuning(period, settings.filter_s)._replace(
+            learning=learning(period), follow=settings.follow_s
+        )
         self._turn = settings.turn_s
         self._dead_time = dead_time
         self._work = make_workspace(robot.model)
@@ -197,7 +205,14 @@ class MultiStep:
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
         basis = response.start_basis(robot.model, self._work, settings.modes)
         self._memory = MultiStepMemory(
-            at, still, still.copy(), basis, no_drag(robot.model), _friction(robot), nothing_known()
+            at,
+            still,
+            still.copy(),
+            basis,
+            no_drag(robot.model),
+            _friction(robot),
+            nothing_known(),
+            no_slip(robot.n_cables, still.size),
         )
         self._solved = False
         self._fresh = int(settings.offset is not None and settings.offset.from_start)

@@ -36,6 +36,7 @@ class HoleDragSettings(Settings):
     """Cables that a dither keeps sliding feel a drag; friction as in the robot file, else as usual."""
 
     turn_s: float = quantity("s", "time that the friction needs for a turn of the dither", 0.1, gt=0)
+    follow_s: float = quantity("s", "time constant with which the drag follows the motion", 0.1, ge=0)
 
 
 class MultiStepSettings(Settings):
@@ -73,6 +74,11 @@ class MultiStepSettings(Settings):
     def turn_s(self) -> float:
         """Time of a turn [s]; 0 if drag is off."""
         return 0.0 if self.hole_drag is None else self.hole_drag.turn_s
+
+    @property
+    def follow_s(self) -> float:
+        """Time constant of the drag [s]; 0 if it is off."""
+        return 0.0 if self.hole_drag is None else self.hole_drag.follow_s
 
     def misfits(self, period_s: float, model: str) -> Iterator[Finding]:
         """Yield path and message of what does not go with a control period [s] and a model."""

@@ -49,6 +49,7 @@ class Tuning(NamedTuple):
         turn: Time of a turn of the friction over the amplitude of the dither [s/m], see robot.hole_drag.
         learning: How the drag is learnt.
         drives: Their lag.
+        follow: Time constant with which drag follows the slip [s].
     """
 
     period: float
@@ -57,6 +58,7 @@ class Tuning(NamedTuple):
     turn: float = 0.0
     learning: Learning = Learning(0.0, 0.0, 0.0, 0.0, 0.0)
     drives: DriveLag = DriveLag(0.0, 0.0)
+    follow: float = 0.0
 
     def sharp(self) -> Tuning:
         """Return the same with solutions that are exact to rounding."""

@@ -4,8 +4,8 @@ Near a stable equilibrium q_eq(d) of the model the robot moves by δ = q - q_eq 
 
     M δ̈ + (α M + D) δ̇ + A δ = -G'C (t u) - F u,        A = K + G'C G,   C = diag(k_c)
 
-with the drag D, F of dithered holes (robot.hole_drag; element dampers are left out: beside α they add a part in a
-thousand of critical damping to the slow modes).
+with the drag D, F of dithered holes (robot.hole_drag), which follows D δ̇ + F u with a time constant. Element
+dampers are left out: beside α they add a part in a thousand of critical damping to the slow modes.
 The tangent must be taken at an equilibrium: the slow lateral modes are so soft (a few N/m) that the unbalanced
 axial forces of any other configuration, divided by the robot's length, would outweigh their stiffness.
 
@@ -46,11 +46,15 @@ class Pull(NamedTuple):
         growing: P, force per time (r, m + 1).
         steady: F, force while the drive moves (r, m + 1).
         drag: D, force per speed (r, r).
+        turned: Part of the drag that follows the slip within a stage, γ h / (τ + γ h); it is in D and F already.
+        held: Drag at the start of a stage (r, m + 1), changed from stage to stage.
     """
 
     growing: Array
     steady: Array
     drag: Array
+    turned: float
+    held: Array
 
 
 class Release(NamedTuple):
@@ -63,6 +67,20 @@ class Release(NamedTuple):
 
     offset: Array
     v: Array
+
+
+class Drag(NamedTuple):
+    """Drag that follows the slip.
+
+    Attributes:
+        holes: What it goes to.
+        held: What it is now (n_free,) [N].
+        time: Time constant τ [s]; 0 if it follows at once.
+    """
+
+    holes: HoleDrag
+    held: Array
+    time: float
 
 
 @njit(cache=True, error_model="numpy")
@@ -156,14 +174,72 @@ def _project(ws: Workspace, V: Array, GV: Array) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def _stage(U: Array, a: float, b: float, t: float, pull: Pull, x: Array, v: Array, X: Array) -> None:
-    """Set X = (a I + b D + V'AV)^-1 (a x + b v + b D x + F + t P): positions of a stage, from its start x, v."""
+    """Set X = (a I + b D + V'AV)^-1 (a x + b v + b D x + F + f + t P): positions of a stage, from its start x, v.
+
+    D and F are the parts that follow within the stage, f what is left of the drag of its start.
+    """
+    left = 1.0 - pull.turned
     for i in range(X.shape[0]):
         for c in range(X.shape[1]):
             X[i, c] = a * x[i, c] + b * v[i, c] + pull.steady[i, c] + t * pull.growing[i, c]
+            X[i, c] += left * pull.held[i, c]
             for j in range(X.shape[0]):
                 X[i, c] += b * pull.drag[i, j] * x[j, c]
     block_banded.solve_transposed(U, X)
     block_banded.solve_upper(U, X)
+
+
+@njit(cache=True, error_model="numpy")
+def _turn(pull: Pull, speed: Array, part: float) -> None:
+    """Let the drag go a part of its way in a stage, whose speeds are (r, m + 1)."""
+    for i in range(speed.shape[0]):
+        for c in range(speed.shape[1]):
+            goal = pull.steady[i, c]
+            for j in range(speed.shape[0]):
+                goal -= pull.drag[i, j] * speed[j, c]
+            pull.held[i, c] += part * (goal - pull.turned * pull.held[i, c])
+
+
+@njit(cache=True, error_model="numpy")
+def _step(U: Array, damping: float, t: float, h: float, pull: Pull, x: Array, vx: Array) -> None:
+    """Move reduced positions and velocities (r, m + 1) on by one step h of the rule."""
+    b = 1.0 / (GAMMA * h)
+    a, stage, speed = b * b + damping * b, np.empty(x.shape), np.empty(x.shape)
+    _stage(U, a, b, t + GAMMA * h, pull, x, vx, stage)
+    for i in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            speed[i, c] = b * (stage[i, c] - x[i, c])
+            x[i, c] += (1.0 - GAMMA) * h * speed[i, c]
+            vx[i, c] += (1.0 - GAMMA) * h * b * (speed[i, c] - vx[i, c])
+    _turn(pull, speed, (1.0 - GAMMA) / GAMMA)
+    _stage(U, a, b, t + h, pull, x, vx, stage)
+    for i in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            vx[i, c] = b * (stage[i, c] - x[i, c])
+            x[i, c] = stage[i, c]
+    _turn(pull, vx, 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _pull(model: Model, ws: Workspace, V: Array, GV: Array, drag: Drag, h: float) -> Pull:
+    """Return what acts in steps of h on the basis V, GV = G V (m, r)."""
+    m, r = GV.shape
+    pull = Pull(
+        np.zeros((r, m + 1)),
+        np.zeros((r, m + 1)),
+        np.zeros((r, r)),
+        GAMMA * h / (drag.time + GAMMA * h),
+        np.zeros((r, m + 1)),
+    )
+    project_drag(model, drag.holes, V, pull.drag, pull.steady)
+    pull.drag[:] *= pull.turned
+    pull.steady[:] *= pull.turned
+    for i in range(r):
+        for k in range(V.shape[0]):
+            pull.held[i, m] += V[k, i] * drag.held[k]
+        for c in range(m):
+            pull.growing[i, c] = -ws.axial[c] * GV[c, i]
+    return pull
 
 
 @njit(cache=True, error_model="numpy")
@@ -187,7 +263,7 @@ def respond(
     tip: int,
     ws: Workspace,
     V: Array,
-    drag: HoleDrag,
+    drag: Drag,
 ) -> tuple[Array, bool]:
     """Predict changes of end pose and tensions after a state.
 
@@ -217,38 +293,22 @@ def respond(
     GV, b = np.empty((m, r)), 1.0 / (GAMMA * h)
     reduced = _project(ws, V, GV)
     a = b * b + model.damping * b
-    pull = Pull(np.zeros((r, m + 1)), np.zeros((r, m + 1)), np.zeros((r, r)))
-    project_drag(model, drag, V, pull.drag, pull.steady)
+    pull = _pull(model, ws, V, GV, drag, h)
     for i in range(r):
         reduced[i, i] += a
         for j in range(r):
             reduced[i, j] += b * pull.drag[i, j]
     CV = np.dot(pose.output_matrix(q_eq, tip), V[first : first + 9])
     x, vx = np.zeros((r, m + 1)), np.zeros((r, m + 1))
-    stage1, stage2 = np.empty((r, m + 1)), np.empty((r, m + 1))
     start = np.zeros((POSE_ROWS + m, m + 1))
     change = np.zeros((steps, POSE_ROWS + m, m + 1))
     if not block_banded.factor_diagonal(reduced):
         return change, False
     _project_state(model.mass, V, release.offset, release.v, x, vx)
-    for i in range(r):
-        for c in range(m):
-            pull.growing[i, c] = -ws.axial[c] * GV[c, i]
     _observe(CV, GV, ws.axial, 0.0, x, start)
     for n in range(steps):
-        t = n * h
-        _stage(reduced, a, b, t + GAMMA * h, pull, x, vx, stage1)
-        for i in range(r):
-            for c in range(m + 1):
-                v1 = b * (stage1[i, c] - x[i, c])
-                x[i, c] += (1.0 - GAMMA) * h * v1
-                vx[i, c] += (1.0 - GAMMA) * h * b * (v1 - vx[i, c])
-        _stage(reduced, a, b, t + h, pull, x, vx, stage2)
-        for i in range(r):
-            for c in range(m + 1):
-                vx[i, c] = b * (stage2[i, c] - x[i, c])
-                x[i, c] = stage2[i, c]
-        _observe(CV, GV, ws.axial, t + h, x, change[n])
+        _step(reduced, model.damping, n * h, h, pull, x, vx)
+        _observe(CV, GV, ws.axial, (n + 1) * h, x, change[n])
         change[n] -= start
     return change, True
 

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from support import mechanics
 from support.mechanics import FREE
+from tcrctl.elements.sliding_cable import STIFFNESS
+from tcrctl.numerics import block_banded
 from tcrctl.robot import dynamics, linear, pose, response
 from tcrctl.robot.equations import assemble, make_workspace
 from tcrctl.robot.equilibrium import equilibrium, static_load
-from tcrctl.robot.hole_drag import no_drag
+from tcrctl.robot.hole_drag import fill_hole_drag, no_drag, turn
 from tcrctl.robot.modes import modes
+from tcrctl.robot.robot import hole_friction
+from tcrctl.robot.sections import FrictionSettings
 
 ROBOTS = ["tcr600", "tcr700"]
 MODES = 16
@@ -45,7 +50,8 @@ class Bent:
         assert linear.factor_shifted(ws.K, ws.U) == 0.0
         return ws
 
-    def respond(self, offset, v, step, steps, drag=None):
+    def respond(self, offset, v, step, steps, drag=None, held=None, turn=0.0):
+        held = np.zeros(self.basis.shape[0]) if held is None else held
         change, stable = response.respond(
             self.model,
             self.rest.q,
@@ -54,7 +60,7 @@ class Bent:
             self.robot.tip,
             self.workspace(),
             self.basis.copy(),
-            no_drag(self.model) if drag is None else drag,
+            response.Drag(no_drag(self.model) if drag is None else drag, held, turn),
         )
         assert stable
         return change
@@ -181,8 +187,79 @@ def test_a_slack_cable_keeps_its_authority_over_its_predicted_tension(tcr700):
     ws.axial[1] = 0.0  # as if cable 2 were slack
     still = np.zeros_like(bent.rest.q)
     release, ahead = response.Release(still, still), instants(0.02, 5)
+    drag = response.Drag(no_drag(bent.model), still[FREE:], 0.0)
     change, stable = response.respond(
-        bent.model, bent.rest.q, release, ahead, tcr700.tip, ws, bent.basis.copy(), no_drag(bent.model)
+        bent.model, bent.rest.q, release, ahead, tcr700.tip, ws, bent.basis.copy(), drag
     )
     assert stable
     assert change[-1, 7 + 1, 1] > 0.0
+
+
+def dragged(bent):
+    """Drag of a robot with friction whose cables are moved to and fro by 2 mm."""
+    drag = no_drag(bent.model)
+    friction = hole_friction(FrictionSettings(), bent.model.first_hole)
+    fill_hole_drag(bent.model, bent.rest.q, bent.workspace(), friction, turn(0.1, 2e-3), drag)
+    return drag
+
+
+def dense(bent, drag, time):
+    """System matrix of (δ, δ', f, t, 1), and its columns for unit ramps, from dense matrices."""
+    ws, size, m = bent.workspace(), bent.basis.shape[0], bent.robot.n_cables
+    mass, stiffness = np.empty((size, size)), np.empty((size, size))
+    response.mass_columns(bent.model.mass, np.eye(size), mass)
+    block_banded.multiply_columns(ws.K, np.eye(size), stiffness)
+    G, axial = ws.G[:, FREE:], bent.model.cables[:, STIFFNESS]
+    stiffness += G.T @ (axial[:, None] * G)
+    cable = np.repeat(np.arange(m), np.diff(bent.model.first_hole))
+    of = np.array([cable == c for c in range(m)], dtype=float)
+    D = drag.path.T @ (drag.coefficient[:, None] * drag.path)
+    F = drag.path.T @ (drag.coefficient[:, None] * drag.through[:, None] * of.T)
+    inverse, n = np.linalg.inv(mass), 3 * size
+    systems = []
+    for c in range(m + 1):  # the last one moves by itself
+        S = np.zeros((n + 2, n + 2))
+        S[:size, size : 2 * size] = np.eye(size)
+        S[size : 2 * size, :size] = -inverse @ stiffness
+        S[size : 2 * size, size : 2 * size] = -bent.model.damping * np.eye(size)
+        S[size : 2 * size, 2 * size : n] = inverse
+        S[2 * size : n, size : 2 * size] = -D / time
+        S[2 * size : n, 2 * size : n] = -np.eye(size) / time
+        if c < m:
+            S[size : 2 * size, n] = -inverse @ (axial[c] * G[c])
+            S[2 * size : n, n + 1] = -F[:, c] / time
+            S[n, n + 1] = 1.0
+        systems.append(S)
+    return systems
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("time", [0.05, 0.2])
+def test_drag_that_follows_the_slip_late_is_that_of_the_dense_equations(tcr600, time):
+    bent = Bent(tcr600)
+    drag, size, m = dragged(bent), bent.basis.shape[0], tcr600.n_cables
+    still, first_cable = np.zeros_like(bent.rest.q), slice(0, bent.model.first_hole[1])
+    held = drag.path[first_cable].T @ (0.05 * drag.coefficient * drag.through)[first_cable]
+    found = bent.respond(still, still, 0.01, 60, drag=drag, held=held, turn=time)[:, :3]
+    output = pose.output_matrix(bent.rest.q, tcr600.tip)[:3]
+    first = 3 * tcr600.tip - FREE
+    for c, system in enumerate(dense(bent, drag, time)):
+        step, x = scipy.linalg.expm(0.01 * system), np.zeros(3 * size + 2)
+        x[-1] = 1.0
+        if c == m:
+            x[2 * size : 3 * size] = held
+        wanted = np.empty((60, 3))
+        for n in range(60):
+            x = step @ x
+            wanted[n] = output @ x[first : first + 9]
+        aside = found[:, :2, c] - wanted[:, :2]  # along the robot it is too quick for these steps
+        assert np.abs(aside).max() < 0.02 * np.abs(wanted[:, :2]).max()
+
+
+def test_drag_that_follows_late_ends_where_one_that_follows_at_once_does(tcr700):
+    bent = Bent(tcr700)
+    drag, still = dragged(bent), np.zeros_like(bent.rest.q)
+    now, late = (bent.respond(still, still, 0.1, 400, drag=drag, turn=time) for time in (0.0, 0.3))
+    assert np.abs(now[3] - late[3]).max() > 0.01 * np.abs(now[3]).max()
+    last = slice(-10, None)  # what does not grow with the ramp is small beside it
+    np.testing.assert_allclose(np.diff(late[last], axis=0), np.diff(now[last], axis=0), rtol=1e-2, atol=1e-3)
