@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import AsJson, unfolded
 
 Logs = Annotated[
     list[Path], typer.Argument(metavar="LOG...", help="Logs of runs, or the folders of the runs.")
@@ -35,17 +36,33 @@ Begin = Annotated[float | None, typer.Option("--from", metavar="SECONDS", help="
 End = Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="Last time shown.")]
 
 
+@dataclass(frozen=True)
+class Shown:
+    """What of the runs is shown, and what they are called."""
+
+    labels: Labels = None
+    begin: Begin = None
+    end: End = None
+
+
+@dataclass(frozen=True)
+class Files:
+    """Where the figures go."""
+
+    out: Out = None
+    file_format: Format = "png"
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False
+
+
+@unfolded
 def plot(
     logs: Logs,
     figures: Figures = None,
-    out: Out = None,
-    file_format: Format = "png",
-    labels: Labels = None,
-    begin: Begin = None,
-    end: End = None,
+    files: Files = Files(),
+    shown: Shown = Shown(),
     as_json: AsJson = False,
 ) -> None:
-    """Draw figures of a run; several logs are overlaid. Files that exist are replaced.
+    """Draw figures of a run; several logs are overlaid.
 
     Figures: overview, path, position, orientation, normal, error, drives, speeds, tensions, timing.
 
@@ -56,18 +73,19 @@ def plot(
       tcrctl plot log.mcap -f tensions --from 10 --to 20
     """
     from tcrctl.analysis.history import read_histories
+    from tcrctl.experiment.headline import count
     from tcrctl.plots import FIGURES, check_names, save_figures
 
     names = list(dict.fromkeys(figures or FIGURES))
-    check_names(names, file_format)
-    histories = read_histories(logs, labels=labels or (), begin=begin, end=end)
-    beside = histories[0].log.path.parent if len(logs) == 1 else Path()
-    files = []
-    for path in save_figures(histories, names, out or beside / "plots", file_format):
-        files.append(str(path))
+    check_names(names, files.file_format)
+    histories = read_histories(logs, labels=shown.labels or (), begin=shown.begin, end=shown.end)
+    out = files.out or (histories[0].log.path.parent if len(logs) == 1 else Path()) / "plots"
+    written = []
+    for path in save_figures(histories, names, out, files.file_format, force=files.force):
+        written.append(str(path))
         if not as_json:
             print(path, flush=True)
     if as_json:
-        print(json.dumps({"status": "ok", "files": files}))
+        print(json.dumps({"status": "ok", "files": written}))
     else:
-        print(f"{len(files)} figures", file=sys.stderr)
+        print(count(len(written), "figure"), file=sys.stderr)

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tcrctl.analysis.history import History
-from tcrctl.errors import DeviceError, UnknownNameError
+from tcrctl.errors import DeviceError, InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,16 +97,33 @@ def check_names(names: Sequence[str], file_format: str) -> None:
 
 
 def save_figures(
-    histories: Sequence[History], names: Sequence[str], out: Path, file_format: str
+    histories: Sequence[History],
+    names: Sequence[str],
+    out: Path,
+    file_format: str,
+    *,
+    force: bool = False,
 ) -> Iterator[Path]:
     """Draw figures and write each to ``out/NAME.FORMAT``; yield every file when it is there.
 
+    Args:
+        histories: One run, or several to compare.
+        names: Which figures.
+        out: Folder that they go to.
+        file_format: One of ``FORMATS``.
+        force: Replace files that exist.
+
     Raises:
         UnknownNameError: If there is no such figure or format; nothing is written then.
+        InputError: If one of the files exists and ``force`` is False; nothing is written then.
         DeviceError: If a file cannot be written.
     """
     check_names(names, file_format)
-    for name in names:
-        path = out / f"{name}.{file_format}"
+    paths = {name: out / f"{name}.{file_format}" for name in names}
+    existing = [] if force else [str(path) for path in paths.values() if path.exists()]
+    if existing:
+        hint = "Give another folder with --out, or --force."
+        raise InputError(f"{', '.join(existing)}: exists already", hint=hint)
+    for name, path in paths.items():
         save(draw(name, histories), path)
         yield path

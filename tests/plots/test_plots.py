@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -303,3 +304,18 @@ def test_the_skeleton_is_that_of_the_robot_in_the_log(pose, several, tcr600: Rob
         assert_allclose(ours.weights, theirs.weights)
     assert read_structure(pose[0].log, 44) is None
     assert read_structure(several[2].log, 48) is None
+
+
+@pytest.mark.parametrize(
+    "verb", [["plot", "-f", "error"], ["report"], ["export", "--csv"]], ids=lambda v: v[0]
+)
+def test_verbs_that_write_files_treat_those_that_exist_alike(tmp_path, capsys, verb):
+    call = [*verb, str(write(tmp_path / "log.mcap", turning, steps=range(5)))]
+    assert main(call) == 0
+    written = Path(capsys.readouterr().out.split()[0])
+    written.write_text("mine")
+    assert main(call) == 2
+    assert capsys.readouterr().err.splitlines()[0] == f"error: {written}: exists already"
+    assert written.read_text() == "mine"
+    assert main([*call, "--force"]) == 0
+    assert written.read_bytes() != b"mine"
