@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.analysis.end_error import angle, distance
 from tcrctl.analysis.limits import Limits, read_limits
 from tcrctl.errors import InputError
 from tcrctl.experiment.run_folder import log_in
@@ -107,8 +108,7 @@ class History:
     @property
     def position_error(self) -> Array:
         """Distance of the end from where it was wanted (n,) [m]."""
-        distance: Array = np.linalg.norm(self.position - self.wanted_position, axis=1)
-        return distance
+        return distance(self.position, self.wanted_position)
 
     @property
     def tracks_orientation(self) -> bool:
@@ -118,9 +118,7 @@ class History:
     @property
     def orientation_error(self) -> Array:
         """Angle between the end normal and the one wanted (n,) [rad]."""
-        apart, sum_ = self.normal - self.wanted_normal, self.normal + self.wanted_normal
-        angle: Array = 2.0 * np.arctan2(np.linalg.norm(apart, axis=1), np.linalg.norm(sum_, axis=1))
-        return angle
+        return angle(self.normal, self.wanted_normal)
 
     @property
     def singular(self) -> NDArray[np.bool_]:
