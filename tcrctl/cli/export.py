@@ -10,7 +10,6 @@ from typing import Annotated
 
 import typer
 
-from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import LogFile
 from tcrctl.cli.options import AsJson, unfolded
 
@@ -18,17 +17,13 @@ from tcrctl.cli.options import AsJson, unfolded
 def _print_columns(wanted: bool) -> None:
     if not wanted:
         return
-    from rich.table import Table
-
     from tcrctl.analysis.table import ERRORS
+    from tcrctl.cli.table import print_table
     from tcrctl.log.columns import COLUMNS, meanings
 
-    table, said = Table("column", "unit", "meaning", box=None), meanings()
-    for name, column in COLUMNS.items():
-        table.add_row(name, column.unit, escaped(said.get(name, "")))
-    for name, (unit, meaning) in ERRORS.items():
-        table.add_row(name, unit, meaning)
-    console().print(table)
+    said = meanings()
+    rows = [(name, column.unit, said.get(name, "")) for name, column in COLUMNS.items()]
+    print_table(("column", "unit", "meaning"), [*rows, *((name, *told) for name, told in ERRORS.items())])
     raise typer.Exit()
 
 

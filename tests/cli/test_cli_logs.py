@@ -104,8 +104,9 @@ def test_info_prints_a_table_that_names_failed_criteria(log):
     assert code == 0
     assert "50 at 20 Hz" in out
     assert records.START["run_id"] in out
-    (line,) = [line for line in out.splitlines() if "orientation_error_deg.max" in line]
-    assert "FAILED: 9.876 deg" in line
+    first, last = [line for line in out.splitlines() if "orientation_error_deg.max" in line]
+    assert "FAILED: orientation_error_deg.max is 9.876 deg" in first
+    assert "FAILED: 9.876 deg" in last
 
 
 def test_info_measures_jitter_lateness_and_lost_steps(tmp_path):
