@@ -378,11 +378,9 @@ def test_the_command_prints_one_object_and_exits_0_or_3(logs, capsys):
     assert main(["replay", path, *change]) == 3
     printed = capsys.readouterr()
     speed = next(item for item in found["deviations"] if item["field"] == "wanted.speed")
-    most = f"on by at most {1e3 * speed['max']:.4g} mm/s"
-    assert (
-        f"different: the command would differ from step {speed['first_step']} on by at most {most}"
-        in printed.out
-    )
+    step, most = speed["first_step"], f"{1e3 * speed['max']:.4g} mm/s"
+    said = f"different: the command would differ from step {step} on by at most {most}"
+    assert said in printed.out
     assert "wanted.drive" in printed.out
     assert main(["replay", path, "--from", "5", "--to", "2"]) == 2
 
