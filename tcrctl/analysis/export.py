@@ -79,8 +79,9 @@ def export_log(
         return Exported((target,), tuple(arrays))
     steps, events = table(log, nodes=nodes, ahead=ahead), _events(log)
     beside = target.with_name(f"{target.stem}.events{target.suffix}")
-    if beside.exists() and not force:
-        raise _exists(beside)
+    existing = [] if force else [file for file in (target, beside) if file.exists()]
+    if existing:
+        raise _exists(existing[0])
     _write(target, write, steps, force)
     _write(beside, write, events, force)
     return Exported((target, beside), tuple(steps))

@@ -128,8 +128,12 @@ class History:
 
     @property
     def angles(self) -> Array:
-        """theta_x and theta_y of the end, (45), without jumps (n, 2) [rad]."""
-        return orientation_angles(self.normal)
+        """theta_x and theta_y of the end, (45) (n, 2) [rad]; theta_x is the one nearest to that wanted."""
+        found, wanted = orientation_angles(self.normal), self.wanted_angles
+        apart = found[:, 0] - wanted[:, 0]
+        turns = np.round(np.where(np.isfinite(apart), apart, 0.0) / (2.0 * np.pi))
+        found[:, 0] -= 2.0 * np.pi * turns
+        return found
 
     @property
     def wanted_angles(self) -> Array:

@@ -54,34 +54,53 @@ class Files:
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False
 
 
+@dataclass(frozen=True)
+class Looks:
+    """How large the figures are and what they are written in."""
+
+    width_mm: Annotated[
+        float, typer.Option("--width-mm", metavar="MM", help="Width of a figure: 88 for one column.")
+    ] = 177.8
+    font: Annotated[str, typer.Option("--font", metavar="NAME", help="Family of the text.")] = "DejaVu Sans"
+    style: Annotated[
+        str, typer.Option("--style", metavar="paper|talk", help="Text and lines for a page or a room.")
+    ] = "paper"
+
+
 @unfolded
 def plot(
     logs: Logs,
     figures: Figures = None,
     files: Files = Files(),
     shown: Shown = Shown(),
+    looks: Looks = Looks(),
     as_json: AsJson = False,
 ) -> None:
     """Draw figures of a run; several logs are overlaid.
 
-    Figures: overview, path, position, orientation, normal, error, drives, speeds, tensions, timing.
+    Figures: overview, path, position, orientation, normal, error, drives, speeds, tensions, timing, task,
+    innovation, latency, comparison. By default those that show something: no comparison of one run, no task
+    where there is none.
 
     Examples:
       tcrctl plot logs/*_letter_t_*/log.mcap
       tcrctl plot log.mcap --figure path --figure error --format pdf --out figures
       tcrctl plot static/log.mcap dynamic/log.mcap --label static --label dynamic
       tcrctl plot log.mcap -f tensions --from 10 --to 20
+      tcrctl plot log.mcap -f error --format pdf --width-mm 88 --font "Liberation Serif"
     """
     from tcrctl.analysis.history import read_histories
     from tcrctl.experiment.headline import count
-    from tcrctl.plots import FIGURES, check_names, save_figures
+    from tcrctl.plots import FIGURES, check_names, save_figures, worth_drawing
+    from tcrctl.plots.look import checked_look
 
-    names = list(dict.fromkeys(figures or FIGURES))
-    check_names(names, files.file_format)
+    check_names(figures or FIGURES, files.file_format)
+    look = checked_look(looks.width_mm, looks.font, looks.style)
     histories = read_histories(logs, labels=shown.labels or (), begin=shown.begin, end=shown.end)
+    names = list(dict.fromkeys(figures or worth_drawing(histories)))
     out = files.out or (histories[0].log.path.parent if len(logs) == 1 else Path()) / "plots"
     written = []
-    for path in save_figures(histories, names, out, files.file_format, force=files.force):
+    for path in save_figures(histories, names, out, files.file_format, force=files.force, look=look):
         written.append(str(path))
         if not as_json:
             print(path, flush=True)
