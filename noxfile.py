@@ -57,6 +57,7 @@ def docs(session: nox.Session) -> None:
         (log,) = Path(folder).rglob("log.mcap")
         session.run("python", "docs/draw_letter.py", str(log), "docs/letter_t.png")
     session.run("python", "docs/draw_control.py")
+    session.run("python", "docs/draw_reports.py")
 
 
 @nox.session

@@ -32,7 +32,7 @@ def told(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLUMNS", "200")
         settings = [part for setting in BELOW for part in ("--set", setting)]
-        said = {"terminal": printed(["run", "laser_pipe", "-q", "--out", str(folder), *settings])}
+        said = {"terminal": printed(["run", "laser_pipe", "--out", str(folder), *settings])}
         run = (folder / "latest").resolve()
         said["info"] = printed(["info", str(run)])
     assert main(["report", str(run)]) == 0

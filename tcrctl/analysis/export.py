@@ -1,18 +1,19 @@
-"""A log as a table (CSV, Parquet) or as arrays (npz), for tools that do not read MCAP.
+"""A log for tools that do not read MCAP: as a table (CSV, Parquet) or as arrays (npz, MATLAB).
 
-Names are the column names of :mod:`tcrctl.log.columns` with the component, where there is one, and the SI
-unit at the end: ``t_s``, ``estimate_position_x_m``, ``applied_speed_c1_m_s``, ``truth_tension_c3_n``,
-``measurement_nodes_m7_n1_z_m``. An npz file keeps arrays whole: ``estimate_position_m`` is (n_steps, 3),
-``measurement_nodes_m`` (n_steps, n_markers, 3); it also has ``node_names``, ``cable_names`` and
-``marker_names``. Numbers in CSV are the shortest that read back as the same bits; bools are 0 and 1. Parquet has
-the columns of CSV in their own types. Where a lean step has no full state, numbers are NaN.
+Columns of a table are those of :mod:`tcrctl.analysis.table`; a table has a second one beside it for the events,
+``run.events.csv`` beside ``run.csv``. Files of arrays keep quantities whole: ``estimate_position_m`` is
+(n_steps, 3), ``measurement_nodes_m`` (n_steps, n_markers, 3); they also have ``node_names``, ``cable_names``,
+``marker_names`` and the events. Numbers in CSV are the shortest that read back as the same bits; bools are 0 and 1.
+Parquet has the columns of CSV in their own types, unit and meaning in the metadata of each. Where a lean step has
+no full state, numbers are NaN.
 """
 
 from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -20,162 +21,164 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.analysis.table import ERRORS, UNIT_SUFFIX, Series, errors, table
 from tcrctl.errors import InputError, LogError
-from tcrctl.log.columns import COLUMNS, Column
+from tcrctl.log.columns import COLUMNS
 from tcrctl.log.reader import Log, read_log
 from tcrctl.visible import cell
 
-AXES: Final = ("x", "y", "z")
-UNIT_SUFFIX: Final = {"m": "_m", "m/s": "_m_s", "N": "_n", "s": "_s"}
-PER_NODE: Final = ("q", "v", "disturbance", "nodes", "valid")
-PER_CABLE: Final = ("drive", "speed", "tension", "predicted_tension", "saturated")
-PER_AXIS: Final = ("position", "normal", "ahead_position", "ahead_normal")
+#: Formats, which are also suffixes.
+TABLES: Final = ("csv", "parquet")
+ARRAYS: Final = ("npz", "mat")
+_NAMES: Final = ("node_names", "cable_names", "marker_names")
+#: MATLAB knows no longer names.
+_MATLAB_NAME: Final = 63
 
 
-def export_csv(
-    path: str | os.PathLike[str], out: str | os.PathLike[str], *, nodes: bool = False, force: bool = False
-) -> list[str]:
-    """Write one row per step and one column per number.
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """What was written.
+
+    Attributes:
+        files: The files; the events of a table are in the second.
+        names: Columns of the table, or arrays.
+    """
+
+    files: tuple[Path, ...]
+    names: tuple[str, ...]
+
+
+def export_log(
+    path: str | os.PathLike[str],
+    form: str,
+    out: str | os.PathLike[str],
+    *,
+    nodes: bool = False,
+    ahead: bool = False,
+    force: bool = False,
+) -> Exported:
+    """Write the steps and the events of a log.
 
     Args:
         path: The log, finished or not.
-        out: CSV file to create.
-        nodes: Also write every node's coordinates, velocities, forces and markers.
-        force: Replace ``out`` if it exists.
-
-    Returns:
-        The column names, in order.
-
-    Raises:
-        InputError: If ``path`` is not a log, or ``out`` exists and ``force`` is False.
-        LogError: If the log is damaged or ``out`` cannot be written.
-    """
-    table = _table(read_log(path), nodes)
-    with _create(Path(out), force) as stream:
-        writer = csv.writer(stream)
-        writer.writerow(map(cell, table))
-        writer.writerows(zip(*(_cells(values) for values in table.values()), strict=True))
-    return list(table)
-
-
-def export_parquet(
-    path: str | os.PathLike[str], out: str | os.PathLike[str], *, nodes: bool = False, force: bool = False
-) -> list[str]:
-    """Write one row per step and one column per number, as Apache Parquet.
-
-    Args:
-        path: The log, finished or not.
-        out: Parquet file to create.
-        nodes: As in :func:`export_csv`.
-        force: Replace ``out`` if it exists.
-
-    Returns:
-        The column names, in order.
+        form: One of ``TABLES`` or ``ARRAYS``.
+        out: File to create.
+        nodes: Tables: also every node's coordinates, velocities, forces and markers.
+        ahead: Tables: also what is wanted at the instants that the controller looks ahead to.
+        force: Replace files that exist.
 
     Raises:
-        InputError: If ``path`` is not a log, ``out`` exists and ``force`` is False, or pyarrow is not installed.
-        LogError: If the log is damaged or ``out`` cannot be written.
+        InputError: If ``path`` is not a log, a file exists and ``force`` is False, or pyarrow is not installed.
+        LogError: If the log is damaged or a file cannot be written.
     """
+    write = _parquet() if form == "parquet" else _FORMS[form]
+    target, log = Path(out), read_log(path)
+    if form in ARRAYS:
+        arrays = _arrays(log)
+        _write(target, write, arrays, force)
+        return Exported((target,), tuple(arrays))
+    steps, events = table(log, nodes=nodes, ahead=ahead), _events(log)
+    beside = target.with_name(f"{target.stem}.events{target.suffix}")
+    existing = [] if force else [file for file in (target, beside) if file.exists()]
+    if existing:
+        raise _exists(existing[0])
+    _write(target, write, steps, force)
+    _write(beside, write, events, force)
+    return Exported((target, beside), tuple(steps))
+
+
+def _events(log: Log) -> dict[str, Series]:
+    """Return the events as a table, in their order."""
+    found = list(log.events())
+    said = {
+        "t_s": ([event.t for event in found], np.float64, "s", "Time on the clock of the steps."),
+        "kind": ([event.kind for event in found], np.str_, "", "Short name for machines."),
+        "level": ([event.level for event in found], np.str_, "", "debug, info, warning, error or fatal."),
+        "message": ([event.message for event in found], np.str_, "", "What happened, for a person."),
+    }
+    return {
+        name: Series(np.array(values, kind), unit, meaning)
+        for name, (values, kind, unit, meaning) in said.items()
+    }
+
+
+def _arrays(log: Log) -> dict[str, Any]:
+    """Return every quantity as one array, first axis = step; the names of their components; the events."""
+    columns = log.columns()
+    arrays: dict[str, Any] = {
+        name + UNIT_SUFFIX.get(COLUMNS[name].unit, ""): values for name, values in columns.items()
+    }
+    for name, values in errors(columns).items():
+        arrays[name + UNIT_SUFFIX[ERRORS[name][0]]] = values
+    for name in _NAMES:
+        arrays[name] = np.array(getattr(log, name), dtype=np.str_)
+    return arrays | {f"events_{name}": series.values for name, series in _events(log).items()}
+
+
+def _write(out: Path, write: Callable[[Any, Any], None], content: Mapping[str, Any], force: bool) -> None:
+    binary = write is not _write_csv
+    mode = ("w" if force else "x") + ("b" if binary else "")
+    try:
+        with open(out, mode, newline=None if binary else "", encoding=None if binary else "utf-8") as stream:
+            write(stream, content)
+    except FileExistsError as error:
+        raise _exists(out) from error
+    except OSError as error:
+        raise LogError(out, f"cannot be written: {error.strerror or error}") from error
+
+
+def _exists(out: Path) -> InputError:
+    return InputError(f"{out}: exists already", hint="Give another name with -o, or --force.")
+
+
+def _write_csv(stream: Any, content: Mapping[str, Series]) -> None:
+    writer = csv.writer(stream)
+    writer.writerow(map(cell, content))
+    writer.writerows(zip(*(_cells(series.values) for series in content.values()), strict=True))
+
+
+def _cells(values: NDArray[Any]) -> Sequence[Any]:
+    if values.dtype.kind == "U":
+        return [cell(text) for text in values.tolist()]
+    cells: list[Any] = (values.astype(np.int8) if values.dtype == np.bool_ else values).tolist()
+    return cells
+
+
+def _parquet() -> Callable[[Any, Mapping[str, Series]], None]:
+    """Return what writes Parquet."""
     try:
         pyarrow: Any = import_module("pyarrow")
         parquet: Any = import_module("pyarrow.parquet")
     except ImportError as error:
         hint = "pip install 'tcrctl[parquet]'"
         raise InputError("Parquet needs the package pyarrow, which is not installed", hint=hint) from error
-    table = _table(read_log(path), nodes)
-    with _create(Path(out), force, binary=True) as stream:
-        parquet.write_table(pyarrow.table(table), stream)
-    return list(table)
+
+    def write(stream: Any, content: Mapping[str, Series]) -> None:
+        held = pyarrow.table({name: series.values for name, series in content.items()})
+        fields = [
+            field.with_metadata({"unit": series.unit, "meaning": series.meaning})
+            for field, series in zip(held.schema, content.values(), strict=True)
+        ]
+        parquet.write_table(held.cast(pyarrow.schema(fields)), stream)
+
+    return write
 
 
-def export_npz(
-    path: str | os.PathLike[str], out: str | os.PathLike[str], *, force: bool = False
-) -> list[str]:
-    """Write every quantity as one array, first axis = step.
+def _write_npz(stream: Any, content: Mapping[str, Any]) -> None:
+    np.savez_compressed(stream, **content)
 
-    Args:
-        path: The log, finished or not.
-        out: npz file to create.
-        force: Replace ``out`` if it exists.
 
-    Returns:
-        The array names.
-
-    Raises:
-        InputError: If ``path`` is not a log, or ``out`` exists and ``force`` is False.
-        LogError: If the log is damaged or ``out`` cannot be written.
-    """
-    log = read_log(path)
-    arrays: dict[str, Any] = {
-        name + UNIT_SUFFIX.get(COLUMNS[name].unit, ""): values for name, values in log.columns().items()
+def _write_mat(stream: Any, content: Mapping[str, Any]) -> None:
+    scipy_io: Any = import_module("scipy.io")
+    held = {
+        name[:_MATLAB_NAME]: values.astype(object) if values.dtype.kind == "U" else values
+        for name, values in content.items()
     }
-    for name in ("node_names", "cable_names", "marker_names"):
-        arrays[name] = np.array(getattr(log, name), dtype=np.str_)
-    with _create(Path(out), force, binary=True) as stream:
-        np.savez_compressed(stream, **arrays)
-    return list(arrays)
+    scipy_io.savemat(stream, held, long_field_names=True, do_compression=True, oned_as="column")
 
 
-def _table(log: Log, nodes: bool) -> dict[str, NDArray[Any]]:
-    """Return every number of every step, each (n_steps,), by full name."""
-    wanted = [name for name, column in COLUMNS.items() if nodes or not _per_node(column)]
-    table: dict[str, NDArray[Any]] = {}
-    for name, values in log.columns(wanted).items():
-        table |= _flat(name, values, log)
-    return table
-
-
-def _per_node(column: Column) -> bool:
-    """Tell whether a quantity has so many numbers that a table is better off without."""
-    raw = column.path.startswith("measurement.raw.") and column.kind.endswith("[]")
-    return raw or column.field in PER_NODE
-
-
-def _create(out: Path, force: bool, *, binary: bool = False) -> Any:
-    mode = ("w" if force else "x") + ("b" if binary else "")
-    try:
-        return open(out, mode, newline=None if binary else "")
-    except FileExistsError as error:
-        raise InputError(f"{out}: exists already", hint="Give another name with -o, or --force.") from error
-    except OSError as error:
-        raise LogError(out, f"cannot be written: {error.strerror or error}") from error
-
-
-def _flat(name: str, values: NDArray[Any], log: Log) -> dict[str, NDArray[Any]]:
-    """Split a quantity into its numbers, each (n_steps,), by full name."""
-    unit = UNIT_SUFFIX.get(COLUMNS[name].unit, "")
-    if values.ndim == 1:
-        return {name + unit: values}
-    numbers = values.reshape(len(values), -1) if values.size else values.reshape(len(values), 0)
-    if not len(values):  # how many numbers a step would have is not known
-        return {f"{name}_{label}{unit}": values.reshape(-1) for label in AXES if values.shape[1:] == (3,)}
-    labels = _labels(COLUMNS[name], values.shape[1:], log)
-    return {f"{name}_{label}{unit}": numbers[:, i] for i, label in enumerate(labels)}
-
-
-def _labels(column: Column, shape: tuple[int, ...], log: Log) -> list[str]:
-    """Return the name of every component, in memory order; numbers where the log knows no names."""
-    count = int(np.prod(shape))
-    if column.field in PER_CABLE:
-        labels = list(log.cable_names)
-    elif column.field == "valid":
-        labels = list(log.marker_names)
-    elif column.field == "nodes":
-        labels = _by_axis(log.marker_names)
-    elif column.field in PER_NODE:
-        labels = _by_axis(log.node_names)
-    elif column.field in PER_AXIS:
-        labels = list(AXES) if len(shape) == 1 else _by_axis(str(i) for i in range(shape[0]))
-    else:
-        labels = []
-    names = labels if len(labels) == count else [str(i) for i in range(count)]
-    return [name.replace(".", "_") for name in names]
-
-
-def _by_axis(names: Iterable[str]) -> list[str]:
-    return [f"{name}_{axis}" for name in names for axis in AXES]
-
-
-def _cells(values: NDArray[Any]) -> list[Any]:
-    cells: list[Any] = (values.astype(np.int8) if values.dtype == np.bool_ else values).tolist()
-    return cells
+_FORMS: Final[Mapping[str, Callable[[Any, Any], None]]] = {
+    "csv": _write_csv,
+    "npz": _write_npz,
+    "mat": _write_mat,
+}

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.analysis.end_error import angle, distance
 from tcrctl.analysis.limits import Limits, read_limits
 from tcrctl.errors import InputError
 from tcrctl.experiment.run_folder import log_in
@@ -107,8 +108,7 @@ class History:
     @property
     def position_error(self) -> Array:
         """Distance of the end from where it was wanted (n,) [m]."""
-        distance: Array = np.linalg.norm(self.position - self.wanted_position, axis=1)
-        return distance
+        return distance(self.position, self.wanted_position)
 
     @property
     def tracks_orientation(self) -> bool:
@@ -118,9 +118,7 @@ class History:
     @property
     def orientation_error(self) -> Array:
         """Angle between the end normal and the one wanted (n,) [rad]."""
-        apart, sum_ = self.normal - self.wanted_normal, self.normal + self.wanted_normal
-        angle: Array = 2.0 * np.arctan2(np.linalg.norm(apart, axis=1), np.linalg.norm(sum_, axis=1))
-        return angle
+        return angle(self.normal, self.wanted_normal)
 
     @property
     def singular(self) -> NDArray[np.bool_]:
@@ -130,8 +128,12 @@ class History:
 
     @property
     def angles(self) -> Array:
-        """theta_x and theta_y of the end, (45), without jumps (n, 2) [rad]."""
-        return orientation_angles(self.normal)
+        """theta_x and theta_y of the end, (45) (n, 2) [rad]; theta_x is the one nearest to that wanted."""
+        found, wanted = orientation_angles(self.normal), self.wanted_angles
+        apart = found[:, 0] - wanted[:, 0]
+        turns = np.round(np.where(np.isfinite(apart), apart, 0.0) / (2.0 * np.pi))
+        found[:, 0] -= 2.0 * np.pi * turns
+        return found
 
     @property
     def wanted_angles(self) -> Array:

@@ -8,12 +8,14 @@ import os
 import sys
 import traceback
 from collections.abc import Callable, MutableMapping, Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from tcrctl import __version__
 from tcrctl.caches.flags import set_flags
+from tcrctl.cli.commit import commit
 from tcrctl.cli.diff import diff
 from tcrctl.cli.emulate import emulate
 from tcrctl.cli.export import export
@@ -71,15 +73,26 @@ VERBS: dict[str, Callable[..., None]] = {
 ONLY_SAY = ("list", "kinds", "show", "schema", "info", "runs", "diff")
 
 
+#: So many digits of a commit tell it apart.
+_COMMIT = 12
+
+
 def _print_version(wanted: bool) -> None:
     if wanted:
-        print(f"tcrctl {__version__}")
+        found = commit(Path(__file__).parents[2])
+        print(f"tcrctl {__version__}" + (f" (commit {found[:_COMMIT]})" if found else ""))
         raise typer.Exit()
 
 
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+        bool,
+        typer.Option(
+            "--version",
+            help="Print version and commit.",
+            callback=_print_version,
+            is_eager=True,
+        ),
     ] = False,
 ) -> None:
     """Experiments with cable-driven tensegrity continuum robots, simulated or on the bench.

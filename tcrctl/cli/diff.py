@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import log_path
 from tcrctl.cli.options import AsJson
 
@@ -63,10 +62,6 @@ def _text(value: Any) -> str:
 
 
 def _table(title: str, head: Sequence[str], rows: Iterable[tuple[str, ...]]) -> None:
-    from rich.table import Table
+    from tcrctl.cli.table import print_table
 
-    table = Table(*head, title=title, title_justify="left", box=None)
-    for row in rows:
-        table.add_row(*(escaped(cell) for cell in row))
-    if table.row_count:
-        console().print(table)
+    print_table(head, rows, title=title)

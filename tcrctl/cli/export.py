@@ -10,7 +10,6 @@ from typing import Annotated
 
 import typer
 
-from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import LogFile
 from tcrctl.cli.options import AsJson, unfolded
 
@@ -18,14 +17,13 @@ from tcrctl.cli.options import AsJson, unfolded
 def _print_columns(wanted: bool) -> None:
     if not wanted:
         return
-    from rich.table import Table
-
+    from tcrctl.analysis.table import ERRORS
+    from tcrctl.cli.table import print_table
     from tcrctl.log.columns import COLUMNS, meanings
 
-    table, said = Table("column", "unit", "meaning", box=None), meanings()
-    for name, column in COLUMNS.items():
-        table.add_row(name, column.unit, escaped(said.get(name, "")))
-    console().print(table)
+    said = meanings()
+    rows = [(name, column.unit, said.get(name, "")) for name, column in COLUMNS.items()]
+    print_table(("column", "unit", "meaning"), [*rows, *((name, *told) for name, told in ERRORS.items())])
     raise typer.Exit()
 
 
@@ -34,10 +32,36 @@ class Form:
     """What is written."""
 
     as_csv: Annotated[bool, typer.Option("--csv", help="One row per step, one column per number.")] = False
-    as_npz: Annotated[bool, typer.Option("--npz", help="One numpy array per quantity.")] = False
     as_parquet: Annotated[
         bool,
         typer.Option("--parquet", help="As CSV, in Apache Parquet; needs pip install 'tcrctl\\[parquet]'."),
+    ] = False
+    as_npz: Annotated[bool, typer.Option("--npz", help="One numpy array per quantity.")] = False
+    as_mat: Annotated[bool, typer.Option("--mat", help="One MATLAB array per quantity.")] = False
+
+    @property
+    def name(self) -> str:
+        """The only one that was asked for.
+
+        Raises:
+            InputError: If there are none or several.
+        """
+        from tcrctl.errors import InputError
+
+        asked = {"csv": self.as_csv, "parquet": self.as_parquet, "npz": self.as_npz, "mat": self.as_mat}
+        found = [name for name, is_asked in asked.items() if is_asked]
+        if len(found) != 1:
+            raise InputError("give one format: --csv, --parquet, --npz or --mat")
+        return found[0]
+
+
+@dataclass(frozen=True)
+class More:
+    """What a table holds only when it is asked for."""
+
+    nodes: Annotated[bool, typer.Option("--nodes", help="CSV, Parquet: also every node and marker.")] = False
+    ahead: Annotated[
+        bool, typer.Option("--ahead", help="CSV, Parquet: also the references ahead, for the prediction.")
     ] = False
 
 
@@ -49,15 +73,17 @@ def export(
         Path | None,
         typer.Option("-o", "--out", metavar="FILE", help="File to write; default: LOG with the new suffix."),
     ] = None,
-    nodes: Annotated[bool, typer.Option("--nodes", help="CSV, Parquet: also every node and marker.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    more: More = More(),
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     columns: Annotated[
         bool,
         typer.Option("--columns", help="List all columns and exit.", callback=_print_columns, is_eager=True),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write the steps of a log as CSV, npz or Parquet; names end in the SI unit, e.g. estimate_position_x_m.
+    """Write the steps of a log as CSV, Parquet, npz or mat; names end in the SI unit, e.g. estimate_position_x_m.
+
+    The events go to a second table beside it, run.events.csv beside run.csv; in npz and mat they are arrays.
 
     Examples:
       tcrctl export log.mcap --csv
@@ -66,19 +92,15 @@ def export(
       tcrctl export --columns
     """
     del columns
-    from tcrctl.analysis.export import export_csv, export_npz, export_parquet
-    from tcrctl.errors import InputError
+    from tcrctl.analysis.export import export_log
+    from tcrctl.experiment.headline import count
 
-    if form.as_csv + form.as_npz + form.as_parquet != 1:
-        raise InputError("give one format: --csv, --npz or --parquet")
-    target = out or log.with_suffix(".csv" if form.as_csv else ".npz" if form.as_npz else ".parquet")
-    if form.as_npz:
-        names = export_npz(log, target, force=force)
-    else:
-        write = export_csv if form.as_csv else export_parquet
-        names = write(log, target, nodes=nodes, force=force)
+    name = form.name
+    target = out or log.with_suffix(f".{name}")
+    made = export_log(log, name, target, nodes=more.nodes, ahead=more.ahead, force=force)
     if as_json:
-        print(json.dumps({"status": "ok", "file": str(target), "columns": names}))
+        files = [str(file) for file in made.files]
+        print(json.dumps({"status": "ok", "file": files[0], "files": files, "columns": made.names}))
     else:
-        print(target)
-        print(f"{len(names)} columns", file=sys.stderr)
+        print(*made.files, sep="\n")
+        print(count(len(made.names), "column" if len(made.files) > 1 else "array"), file=sys.stderr)

@@ -140,13 +140,13 @@ def identify(
     with _progress_line(shown=not shown.quiet) as progress:
         result = find(loaded, engine=side.engine, notify=say, progress=progress)
     files = _write(loaded, result, out)
-    for warning in result.warnings:
+    for warning in () if shown.quiet else result.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     if result.reason:
         print(f"{result.status}: {result.reason}; this is the best answer until then", file=sys.stderr)
     if shown.as_json:
         print(json.dumps(result.as_json(*files)))
-    else:
+    elif not shown.quiet:
         from tcrctl.cli.identify_table import print_result
 
         print_result(result)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import LogFiles
 from tcrctl.cli.options import AsJson
 
@@ -35,29 +34,26 @@ def info(logs: LogFiles, as_json: AsJson = False) -> None:
 
 
 def _print_tables(found: LogInfo) -> None:
-    from rich.table import Table
+    from tcrctl.cli.table import print_facts
 
-    screen = console()
+    print_facts(_facts(found))
+    print_facts([(name, text, "") for name, text in _result(found)], "result")
     provenance = {**found.start, **found.versions}.items()
-    told = (("", _facts(found).items()), ("result", [*_result(found)]), ("provenance", provenance))
-    for title, rows in told:
-        if not rows:
-            continue
-        table = Table(title=title, title_justify="left", show_header=False, box=None)
-        table.add_column(style="bold", no_wrap=True)
-        table.add_column(overflow="fold")
-        for name, value in rows:
-            table.add_row(escaped(name), escaped(value))
-        screen.print(table)
+    print_facts([(name, str(value), "") for name, value in provenance], "provenance")
 
 
-def _facts(found: LogInfo) -> dict[str, Any]:
+def _facts(found: LogInfo) -> Iterator[tuple[str, str, str]]:
+    from tcrctl.cli.table import STATUS_STYLES
+    from tcrctl.experiment.judgement import judgements
+
     complete = "yes" if found.complete else f"no; mend it with: tcrctl recover {shlex.quote(found.path)}"
     rate = f" at {found.rate_hz:.4g} Hz" if found.rate_hz else ""
     per_step = f", {found.bytes_per_step:.0f} per step" if found.bytes_per_step else ""
-    return {
-        "log": found.path,
-        "status": f"{found.status}{': ' if found.reason else ''}{found.reason}",
+    reason = f"{': ' if found.reason else ''}{found.reason}"
+    yield "log", found.path, ""
+    yield "status", f"{found.status}{reason}", STATUS_STYLES.get(found.status, "yellow")
+    yield from (("criterion", str(one), "red") for one in judgements(found.result) if one.style == "bad")
+    rest = {
         "complete": "recovered; the end may be missing" if found.recovered else complete,
         "duration": f"{found.duration_s:.3f} s",
         "steps": f"{found.steps}{rate}, {found.lost_steps} lost, {found.unconverged_steps} unconverged",
@@ -67,6 +63,7 @@ def _facts(found: LogInfo) -> dict[str, Any]:
         "attachments": ", ".join(found.attachments) or "none",
         "size": f"{found.size_bytes} bytes{per_step}",
     }
+    yield from ((name, text, "") for name, text in rest.items())
 
 
 def _overruns(found: LogInfo) -> str:

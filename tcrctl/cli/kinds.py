@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 
-from tcrctl.cli.list import print_columns
 from tcrctl.cli.options import AsJson
+from tcrctl.cli.table import print_table
 
 
 def kinds(as_json: AsJson = False) -> None:
@@ -24,7 +24,7 @@ def kinds(as_json: AsJson = False) -> None:
         print(json.dumps(rows))
         return
     keys = ("section", "kind", "from", "description")
-    print_columns([key.upper() for key in keys], keys, rows)
+    print_table([key.upper() for key in keys], [[row[key] for key in keys] for row in rows])
 
 
 def _rows() -> Iterator[dict[str, str]]:

@@ -9,6 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from tcrctl.cli.options import AsJson
+from tcrctl.cli.table import print_table
+
+_SHOWN = ("name", "robot", "description")
+_TITLES = {
+    "experiments": "EXPERIMENT",
+    "identifications": "IDENTIFICATION",
+    "studies": "STUDY",
+    "robots": "ROBOT",
+    "rigs": "RIG",
+}
 
 
 def list_shipped(as_json: AsJson = False) -> None:
@@ -30,27 +40,22 @@ def list_shipped(as_json: AsJson = False) -> None:
     studies = [_entry(name, path, ("description",)) for name, path in shipped.studies().items()]
     robots = [_entry(name, path, ("description",)) for name, path in shipped.robots().items()]
     rigs = [_entry(name, path, ("description",)) for name, path in shipped.rigs().items()]
+    found = {
+        "experiments": experiments,
+        "identifications": identifications,
+        "studies": studies,
+        "robots": robots,
+        "rigs": rigs,
+    }
     if as_json:
-        found = {
-            "experiments": experiments,
-            "identifications": identifications,
-            "studies": studies,
-            "robots": robots,
-            "rigs": rigs,
-        }
         print(json.dumps(found))
         return
-    print_columns(("EXPERIMENT", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), experiments)
-    print()
-    print_columns(
-        ("IDENTIFICATION", "ROBOT", "DESCRIPTION"), ("name", "robot", "description"), identifications
-    )
-    print()
-    print_columns(("STUDY", "DESCRIPTION"), ("name", "description"), studies)
-    print()
-    print_columns(("ROBOT", "DESCRIPTION"), ("name", "description"), robots)
-    print()
-    print_columns(("RIG", "DESCRIPTION"), ("name", "description"), rigs)
+    for i, (kind, entries) in enumerate(found.items()):
+        keys = [key for key in _SHOWN if key in entries[0]] if entries else []
+        if i and keys:
+            print()
+        titles = [_TITLES[kind], *(key.upper() for key in keys[1:])]
+        print_table(titles, [[entry[key] for key in keys] for entry in entries])
 
 
 def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:
@@ -68,17 +73,3 @@ def _entry(name: str, path: Path, keys: Sequence[str]) -> dict[str, Any]:
         else {"description": f"not readable; see: tcrctl validate {shlex.quote(str(path))}"}
     )
     return {"name": name, **{key: str(values.get(key) or "") for key in keys}, "path": str(path)}
-
-
-def print_columns(titles: Sequence[str], keys: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
-    """Print rows in columns as wide as they need.
-
-    Args:
-        titles: Of the columns.
-        keys: Of their values in the rows.
-        rows: Text by key.
-    """
-    cells = [list(titles), *([row[key] for key in keys] for row in rows)]
-    widths = [max(len(row[i]) for row in cells) for i in range(len(keys))]
-    for row in cells:
-        print("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())

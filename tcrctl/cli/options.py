@@ -27,7 +27,7 @@ Overrides: TypeAlias = Annotated[
 ]
 AsJson: TypeAlias = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 Quiet: TypeAlias = Annotated[
-    bool, typer.Option("--quiet", "-q", help="No progress and no messages, only the result.")
+    bool, typer.Option("--quiet", "-q", help="Print errors only; with --json the object too.")
 ]
 IsRobot: TypeAlias = Annotated[bool, typer.Option("--robot", help="Robot files instead of experiments.")]
 

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcrctl.cli.console import console, escaped
+from tcrctl.cli.console import console
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.cli.table import print_facts, print_table
 
 if TYPE_CHECKING:
     from tcrctl.paper.job import Done, Job
@@ -86,7 +87,7 @@ def paper(
         print(f"error: {report.reason}", file=sys.stderr)
     if as_json:
         print(json.dumps(report.as_json()))
-    else:
+    elif not quiet:
         _print_table(report)
     if report.exit_code:
         raise typer.Exit(report.exit_code)
@@ -101,9 +102,9 @@ def _progress(count: int, *, quiet: bool) -> Iterator[Told]:
     if not sys.stderr.isatty():
         yield (lambda job: None), _Counter(count).say
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=console(stderr=True), transient=True) as bar:
         task, running = bar.add_task("", total=count), dict[str, None]()
 
@@ -140,15 +141,9 @@ def _say_run(run: PlannedRun, row: Row) -> None:
 
 
 def _print_table(report: Report) -> None:
-    from rich.table import Table
+    from tcrctl.paper.report import BAD, cells, titles
 
-    from tcrctl.paper.report import cells, titles
-
-    screen, table = console(), Table(box=None)
-    for title in titles(report.lines):
-        table.add_column(title, overflow="fold")
-    for line, texts in zip(report.lines, cells(report.lines), strict=True):
-        table.add_row(*map(escaped, texts), style=_STYLES.get(line.verdict, ""))
-    screen.print(table)
-    screen.print(" ".join(report.notes()), markup=False, highlight=False)
+    lines = sorted(report.lines, key=lambda line: line.verdict not in BAD)
+    print_table(titles(lines), cells(lines), styles=[_STYLES.get(line.verdict, "") for line in lines])
+    print_facts([("", " ".join(report.notes()), "")])
     print(f"report: {report.folder}")

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcrctl.cli.console import console, escaped
 from tcrctl.cli.log_file import LogFile
 from tcrctl.cli.options import AsJson, Overrides, unfolded
 from tcrctl.cli.progress import progress_bar
@@ -133,40 +132,22 @@ def _announce(changes: Sequence[Change]) -> None:
 
 
 def _print(found: Replay) -> None:
-    from rich.table import Table
-
+    from tcrctl.cli.table import print_facts, print_table
     from tcrctl.log.comparison import table
 
-    screen = console()
-    facts = Table(show_header=False, box=None)
-    facts.add_column(style="bold", no_wrap=True)
-    facts.add_column(overflow="fold")
-    for name, text in _facts(found):
-        facts.add_row(name, escaped(text))
-    screen.print(facts)
-    if found.deviations:
-        rows = Table(
-            "quantity",
-            "first step",
-            "steps",
-            "largest",
-            "rms",
-            title="differences",
-            title_justify="left",
-            box=None,
-        )
-        for row in table(found.deviations):
-            rows.add_row(*(escaped(cell) for cell in row))
-        screen.print(rows)
+    print_facts(_facts(found))
+    heads = ("quantity", "first step", "steps", "largest", "rms")
+    print_table(heads, table(found.deviations), title="differences")
 
 
-def _facts(found: Replay) -> list[tuple[str, str]]:
+def _facts(found: Replay) -> list[tuple[str, str, str]]:
     speed = found.duration_s / found.seconds if found.seconds > 0.0 else 0.0
+    style = {"identical": "bold green", "different": "bold red"}.get(found.status, "bold yellow")
     facts = [
-        ("log", str(found.log)),
-        ("status", f"{found.status}{': ' if found.reason else ''}{found.reason}"),
-        ("steps", f"{found.steps} replayed, {found.compared} compared, {found.different} different"),
-        ("speed", f"{found.duration_s:.2f} s in {found.seconds:.2f} s, {speed:.0f} times real time"),
+        ("log", str(found.log), ""),
+        ("status", f"{found.status}{': ' if found.reason else ''}{found.reason}", style),
+        ("steps", f"{found.steps} replayed, {found.compared} compared, {found.different} different", ""),
+        ("speed", f"{found.duration_s:.2f} s in {found.seconds:.2f} s, {speed:.0f} times real time", ""),
     ]
-    facts += [("not compared", text) for text in found.not_compared]
-    return [*facts, ("replayed log", str(found.out))] if found.out is not None else facts
+    facts += [("not compared", text, "") for text in found.not_compared]
+    return [*facts, ("replayed log", str(found.out), "")] if found.out is not None else facts

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.console import console, escaped
 from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, Spec, unfolded
 from tcrctl.cli.progress import progress_bar
 
@@ -115,21 +114,26 @@ def run(
             experiment = prepare(loaded, seed=manner.seed, notify=say)
             path = _planned(experiment, manner.force, say)
         if dry_run:
-            print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
+            if as_json or not quiet:
+                print(json.dumps(_plan_json(experiment, path)) if as_json else _plan_text(experiment, path))
             return
         if loaded.rig is not None and not yes:
             ask(f"{loaded.robot.name} on rig {loaded.rig.rig.name} will move for {_length(experiment)}.")
         summary = _run(experiment, manner, say, tap, quiet=quiet)
         if summary.log is not None:
             link_latest(summary.log.parent)
+    _tell(summary, quiet=quiet, as_json=as_json)
+    if summary.exit_code:
+        raise typer.Exit(summary.exit_code)
+
+
+def _tell(summary: Summary, *, quiet: bool, as_json: bool) -> None:
     if summary.reason:
         print(f"{'error' if summary.exit_code != 3 else summary.status}: {summary.reason}", file=sys.stderr)
     if as_json:
         print(json.dumps(summary.as_json()))
-    else:
+    elif not quiet:
         _print_summary(summary)
-    if summary.exit_code:
-        raise typer.Exit(summary.exit_code)
 
 
 def _get_ready(out: Path) -> None:
@@ -228,15 +232,8 @@ def _plan_text(experiment: Experiment, path: StaticPath | None) -> str:
 
 
 def _print_summary(summary: Summary) -> None:
-    from rich.table import Table
-
     from tcrctl.cli.run_table import rows
+    from tcrctl.cli.table import print_facts
 
-    screen = console()
-    table = Table(show_header=False, box=None)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, text, style in rows(summary):
-        table.add_row(escaped(name), escaped(text), style=style)
-    screen.print(table)
+    print_facts(rows(summary))
     print(f"look at the log: tcrctl info {shlex.quote(str(summary.log))}")

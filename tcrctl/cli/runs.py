@@ -105,6 +105,8 @@ def _found(out: Path, which: Which) -> list[FoundRun]:
 
 
 def _remove(found: list[FoundRun], *, yes: bool, as_json: bool) -> None:
+    from tcrctl.experiment.headline import count
+
     size = sum(run.size for run in found)
     for run in found:
         if yes:
@@ -114,7 +116,7 @@ def _remove(found: list[FoundRun], *, yes: bool, as_json: bool) -> None:
     if as_json:
         print(json.dumps({"status": "success", "removed": yes, "runs": [str(run.folder) for run in found]}))
     said = "removed" if yes else "would be removed; --yes removes them"
-    print(f"{len(found)} runs, {size / 1e6:.1f} MB: {said}", file=sys.stderr)
+    print(f"{count(len(found), 'run')}, {size / 1e6:.1f} MB: {said}", file=sys.stderr)
 
 
 def _as_json(run: FoundRun) -> dict[str, object]:
@@ -126,10 +128,10 @@ def _print(found: list[FoundRun], names: list[str], form: str) -> None:
 
     table = TextTable(tuple(names), tuple(tuple(_cell(run, name) for name in names) for run in found))
     if form == "text":
-        from tcrctl.cli.list import print_columns
+        from tcrctl.cli.table import STATUS_STYLES, print_table
 
-        rows = [dict(zip(names, row, strict=True)) for row in table.rows]
-        print_columns(names, names, rows)
+        styles = [STATUS_STYLES.get(str(run.value("status")), "") for run in found]
+        print_table(table.head, table.rows, styles=styles)
     else:
         print(table.formatted(form), end="")  # type: ignore[arg-type]  # checked before
 
@@ -140,4 +142,6 @@ def _cell(run: FoundRun, name: str) -> str:
         return "-"
     if isinstance(value, bool):
         return str(value).lower()
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    from tcrctl.experiment.headline import number
+
+    return number(value)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_json: AsJson = False) -> None:
-    """Print an experiment as it will run: defaults filled in, --set applied.
+    """Print an experiment as it will run: defaults filled in, --set applied. A robot file keeps its comments.
 
     Examples:
       tcrctl show letter_t
@@ -24,6 +24,12 @@ def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_jso
     found = _found(spec, overrides or (), robot=robot)
     if as_json:
         print(found.model_dump_json())
+    elif robot:
+        from tcrctl.config import shipped
+        from tcrctl.config.commented import with_values
+
+        text = strict_yaml.read(shipped.find_robot(spec)).decode("utf-8-sig")
+        print(with_values(text, found.model_dump(mode="json")), end="")
     else:
         print(strict_yaml.dumps(found.model_dump(mode="json")), end="")
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.console import console
 from tcrctl.cli.options import AsJson, Overrides, Quiet, Spec, unfolded
 from tcrctl.cli.progress import progress_bar
 from tcrctl.visible import cell
@@ -89,7 +88,7 @@ def stability(
         draw(report, figure)
     if as_json:
         print(json.dumps(report.as_json()))
-    else:
+    elif not quiet:
         _print(report)
     if report.exit_code:
         print(f"{report.as_json()['status']}: {report.reason}", file=sys.stderr)
@@ -138,32 +137,31 @@ def _nothing(text: str) -> None:
 
 
 def _print(report: StabilityReport) -> None:
-    from rich import box
-    from rich.table import Table
+    from tcrctl.cli.table import print_facts, print_table
 
-    table = Table(box=box.SIMPLE_HEAD)
-    for name in ("t [s]", "max |mu| (42)", "spectral radius", "growth per s", "frequency [Hz]"):
-        table.add_column(name, justify="right")
-    table.add_column("")
-    for point in report.points:
-        style = "" if point.radius < 1.0 else "red"
-        table.add_row(
+    rows = [
+        (
             f"{point.t:.2f}",
             f"{point.inner:.2g}",
             f"{point.radius:.5f}",
             f"{report.growth(point):.3g}",
             f"{report.frequency(point):.2f}",
             _remarks(point),
-            style=style,
         )
-    screen = console()
-    screen.print(f"{report.spec}: {report.robot}, controller {report.controller}, {report.states} states")
-    screen.print(f"inner iteration: {report.inner_iteration or 'none'}", highlight=False, markup=False)
-    screen.print(table)
+        for point in report.points
+    ]
+    what = f"{report.robot}, controller {report.controller}, {report.states} states"
+    print_facts([(report.spec, what, ""), ("inner iteration", report.inner_iteration or "none", "")])
+    print_table(
+        ("t [s]", "max |mu| (42)", "spectral radius", "growth per s", "frequency [Hz]", "remarks"),
+        rows,
+        styles=["" if point.radius < 1.0 else "red" for point in report.points],
+        right=range(5),
+    )
     worst = report.worst
     if worst is not None:
         text = f"largest spectral radius {worst.radius:.5f} at {worst.t:.2f} s"
-        screen.print(f"{text}: {'stable' if report.exit_code == 0 else 'not stable'}")
+        print(f"{text}: {'stable' if report.exit_code == 0 else 'not stable'}")
 
 
 def _remarks(point: StabilityPoint) -> str:

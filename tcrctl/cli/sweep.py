@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.console import console, escaped
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.cli.table import print_table
 
 if TYPE_CHECKING:
     from tcrctl.study.loading import LoadedStudy
@@ -209,6 +209,8 @@ def _finish(study: LoadedStudy, result: Done, out: Path, shown: Shown, *, as_jso
         print(f"error: {reason}; {result.missing} runs are missing: start again to go on", file=sys.stderr)
     if as_json:
         print(json.dumps(_as_json(study, result, found, folder, reason)))
+    elif shown.quiet and shown.form == "text":
+        pass
     elif shown.form != "text":
         print(found.text(shown.form), end="")  # type: ignore[arg-type]  # checked above
     else:
@@ -238,16 +240,8 @@ def _as_json(study: LoadedStudy, result: Done, found: Findings, folder: Path, re
 
 
 def _print_tables(found: Findings) -> None:
-    from rich.table import Table
-
-    screen = console()
     for text in found.tables(brief=True):
-        table = Table(box=None)
-        for title in text.head:
-            table.add_column(escaped(title), overflow="fold")
-        for row in text.rows:
-            table.add_row(*map(escaped, row))
-        screen.print(table)
+        print_table(text.head, text.rows)
 
 
 @contextmanager

@@ -78,7 +78,7 @@ def tune(
     files = _write(study, found, out)
     if as_json:
         print(json.dumps(_as_json(study, found, files)))
-    else:
+    elif not quiet:
         _print(found, files)
 
 

@@ -71,7 +71,7 @@ def workspace(
     _write(found, folder)
     if as_json:
         print(json.dumps({"status": "success", "reason": "", **found.as_json(), "folder": str(folder)}))
-    else:
+    elif not quiet:
         _print(found, folder)
 
 

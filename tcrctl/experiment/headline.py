@@ -70,6 +70,16 @@ def number(value: Any, unit: str = "") -> str:
     return f"{f'{value:.4g}' if isinstance(value, float) else value} {unit}".rstrip()
 
 
+def count(how_many: int, noun: str) -> str:
+    """Write how many there are: ``1 figure``, ``2 figures``.
+
+    Args:
+        how_many: The number.
+        noun: What is counted, one of them; its plural ends in s.
+    """
+    return f"{how_many} {noun}{'' if how_many == 1 else 's'}"
+
+
 def numbers(found: Mapping[str, float] | None, unit: str) -> str:
     """Write several numbers of one quantity: ``max 0.2177 mm, rms 0.1 mm``.
 

@@ -56,9 +56,11 @@ class SafetyGuard:
         if wrong:
             return SafetyLimitError(step, "number of commands that are no finite numbers", wrong, 0, "")
         if not error <= limits.position_error:
-            return SafetyLimitError(step, "position error", 1e3 * error, 1e3 * limits.position_error, "mm")
+            return SafetyLimitError(
+                step, "estimated position error", 1e3 * error, 1e3 * limits.position_error, "mm"
+            )
         if not tension <= limits.tension:
-            return SafetyLimitError(step, "cable tension", tension, limits.tension, "N")
+            return SafetyLimitError(step, "estimated cable tension", tension, limits.tension, "N")
         if self._unsolved >= limits.unsolved:
             why = info.reason or ("the estimator failed" if info.converged else "the controller failed")
             what = f"number of steps in a row without a solution ({why})"

@@ -13,6 +13,10 @@ drives         drive lengths over time                                          
 speeds         drive speeds over time, limits, saturation                           -
 tensions       cable tensions over time, limits                                     -
 timing         time that a control step takes                                       -
+task           walls, holes, objects, pipes, and the path of the end among them     Fig. 20, 24
+innovation     distance of the markers from the estimator's model                   -
+latency        age of the camera picture, time from it to the drives                -
+comparison     errors, tension and control time of several runs beside each other   -
 =============  ===================================================================  =====================
 
 The modules here import matplotlib; this one does so only when a figure is drawn.
@@ -26,7 +30,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tcrctl.analysis.history import History
-from tcrctl.errors import DeviceError, UnknownNameError
+from tcrctl.errors import DeviceError, InputError, UnknownNameError
+from tcrctl.plots.look import USUAL, Look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,18 +47,25 @@ FIGURES: Final = (
     "speeds",
     "tensions",
     "timing",
+    "task",
+    "innovation",
+    "latency",
+    "comparison",
 )
 """Every kind of figure: the name of its module."""
 
 FORMATS: Final = ("png", "pdf", "svg")
+#: The same figure is the same file.
+_METADATA: Final = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 
 
-def draw(name: str, histories: Sequence[History]) -> Figure:
+def draw(name: str, histories: Sequence[History], look: Look = USUAL) -> Figure:
     """Draw a figure.
 
     Args:
         name: One of ``FIGURES``.
         histories: One run, or several to compare.
+        look: Width, font and style.
 
     Raises:
         UnknownNameError: If there is no such kind of figure.
@@ -62,12 +74,12 @@ def draw(name: str, histories: Sequence[History]) -> Figure:
     from tcrctl.plots.style import printed
 
     module = importlib.import_module(f"tcrctl.plots.{name}")
-    with printed():
+    with printed(look):
         figure: Figure = module.draw(histories)
     return figure
 
 
-def save(figure: Figure, path: Path) -> None:
+def save(figure: Figure, path: Path, look: Look = USUAL) -> None:
     """Write a figure in the format of the file's suffix; an existing file is replaced.
 
     Raises:
@@ -77,8 +89,8 @@ def save(figure: Figure, path: Path) -> None:
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with printed():
-            figure.savefig(path)
+        with printed(look):
+            figure.savefig(path, metadata=_METADATA.get(path.suffix))
     except OSError as error:
         raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error
 
@@ -96,17 +108,46 @@ def check_names(names: Sequence[str], file_format: str) -> None:
         raise UnknownNameError("file format", file_format, FORMATS)
 
 
+def worth_drawing(histories: Sequence[History]) -> list[str]:
+    """Return the figures that show something of these runs."""
+    from tcrctl.analysis.task_drawing import read_drawing
+
+    missing = set() if len(histories) > 1 else {"comparison"}
+    if not any(len(read_drawing(history.log).corners) for history in histories):
+        missing.add("task")
+    return [name for name in FIGURES if name not in missing]
+
+
 def save_figures(
-    histories: Sequence[History], names: Sequence[str], out: Path, file_format: str
+    histories: Sequence[History],
+    names: Sequence[str],
+    out: Path,
+    file_format: str,
+    *,
+    force: bool = False,
+    look: Look = USUAL,
 ) -> Iterator[Path]:
     """Draw figures and write each to ``out/NAME.FORMAT``; yield every file when it is there.
 
+    Args:
+        histories: One run, or several to compare.
+        names: Which figures.
+        out: Folder that they go to.
+        file_format: One of ``FORMATS``.
+        force: Replace files that exist.
+        look: Width, font and style.
+
     Raises:
         UnknownNameError: If there is no such figure or format; nothing is written then.
+        InputError: If one of the files exists and ``force`` is False; nothing is written then.
         DeviceError: If a file cannot be written.
     """
     check_names(names, file_format)
-    for name in names:
-        path = out / f"{name}.{file_format}"
-        save(draw(name, histories), path)
+    paths = {name: out / f"{name}.{file_format}" for name in names}
+    existing = [] if force else [str(path) for path in paths.values() if path.exists()]
+    if existing:
+        hint = "Give another folder with --out, or --force."
+        raise InputError(f"{', '.join(existing)}: exists already", hint=hint)
+    for name, path in paths.items():
+        save(draw(name, histories, look), path, look)
         yield path

@@ -19,7 +19,7 @@ def draw(histories: Sequence[History]) -> Figure:
     for panel, axis in zip(panels, "xy", strict=True):
         panel.set_ylabel(rf"$\theta_{axis}$ [deg]")
     if not any(history.tracks_orientation for history in histories):
-        panels[0].set_title("orientation is free", loc="right", fontsize=7)
+        panels[0].set_title("orientation is free", loc="right", fontsize="small")
     style.span(panels, histories)
     style.legend(figure, panels)
     return figure

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
 from tcrctl.analysis.structure import read_structure
 from tcrctl.plots import style
+from tcrctl.plots.plan import draw_plan
 from tcrctl.plots.space import draw_body, equal_scale
-from tcrctl.signals import Array
-
-_VIEWS: Final = {(0, 1): "from above", (0, 2): "from the front", (1, 2): "from the side"}
-
-
-#: A path no larger than this is a point.
-_POINT_MM: Final = 1.0
 
 
 def draw(histories: Sequence[History]) -> Figure:
@@ -28,7 +20,7 @@ def draw(histories: Sequence[History]) -> Figure:
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 2.2), height_ratios=(2.2, 1.0))
     _body(figure.add_subplot(grid[:, 0], projection="3d"), histories)
     drawing, below = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
-    _drawing(drawing, histories)
+    draw_plan(drawing, histories)
     for i, history in enumerate(histories):
         below.plot(history.t, 1e3 * history.position_error, **style.line(i))
     below.set(xlabel="t [s]", ylabel="error [mm]", ylim=(0.0, None))
@@ -53,28 +45,3 @@ def _body(axes: Any, histories: Sequence[History]) -> None:
     for artist in axes.lines:  # the box is larger than its place
         artist.set_clip_on(False)
         artist.set_in_layout(False)
-
-
-def _drawing(panel: Axes, histories: Sequence[History]) -> None:
-    a, b = _plane([history.wanted_position for history in histories])
-    wanted = 1e3 * histories[0].wanted_position
-    thick: dict[str, Any] = (
-        {"lw": 4.0} if np.ptp(wanted, axis=0).max() > _POINT_MM else {"ls": "", "marker": "P", "ms": 9}
-    )
-    panel.plot(wanted[:, a], wanted[:, b], color="#bbbbbb", **thick, label="wanted")
-    for i, history in enumerate(histories):
-        name = "end of the robot" if len(histories) == 1 else history.label
-        path = 1e3 * history.position
-        panel.plot(path[:, a], path[:, b], **style.line(i), label=name)
-    panel.set_title(_VIEWS[a, b], loc="left")
-    panel.set(xlabel=f"{'xyz'[a]} [mm]", ylabel=f"{'xyz'[b]} [mm]")
-    panel.set_aspect("equal", adjustable="datalim")
-
-
-def _plane(paths: Sequence[Array]) -> tuple[int, int]:
-    """Return the axes of the projection in which the path is largest; from above if it hardly moves."""
-    extent = np.ptp(np.concatenate(paths), axis=0)
-    if np.max(extent) < 1e-3 * _POINT_MM:
-        return 0, 1
-    a, b = sorted(np.argsort(-extent, kind="stable")[:2].tolist())
-    return a, b

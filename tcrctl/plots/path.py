@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
+from tcrctl.analysis.pen import pen_down
+from tcrctl.analysis.references import shared
 from tcrctl.plots import style
 from tcrctl.plots.space import arrows, equal_scale, name_axes
 from tcrctl.signals import Array
@@ -24,35 +26,37 @@ def draw(histories: Sequence[History]) -> Figure:
     extent = max(float(np.ptp(path, axis=0).max()) for path in paths)
     turns = any(history.tracks_orientation for history in histories)
     length = max(0.15 * extent, 20.0 if turns else 4.0)
+    whole = shared(histories, [history.wanted_position for history in histories])
     for i, history in enumerate(histories):
-        _draw(axes, history, length, style.line(i), history.label if len(histories) > 1 else "actual", not i)
+        name = history.label if len(histories) > 1 else "actual"
+        if whole in (None, i):
+            wanted = "wanted" if whole is not None else f"wanted, {history.label}"
+            _draw_wanted(
+                axes, history, length, wanted, style.BLACK if whole is not None else style.line(i)["color"]
+            )
+        _draw(axes, history, length, style.line(i), name)
     equal_scale(axes, paths, length)
     name_axes(axes)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure
 
 
-def _draw(
-    axes: Any, history: History, length: float, look: dict[str, Any], name: str, with_wanted: bool
-) -> None:
-    wanted, actual = 1e3 * history.wanted_position, 1e3 * history.position
+def _draw_wanted(axes: Any, history: History, length: float, name: str, colour: str) -> None:
+    wanted = 1e3 * history.wanted_position
+    axes.plot(*wanted.T, color=colour, lw=0.9, ls=(0, (2, 2)), label=name, zorder=6)
+    if not history.tracks_orientation:
+        return
+    rows = _spread(1e3 * history.position, history.t)
+    rows = rows[np.isfinite(history.wanted_normal[rows]).all(axis=1)]
+    look = {"color": colour, "lw": 0.7, "label": f"{name} end axis", "zorder": 2}
+    arrows(axes, wanted[rows], -history.wanted_normal[rows], 1.25 * length, **look)
+
+
+def _draw(axes: Any, history: History, length: float, look: dict[str, Any], name: str) -> None:
+    actual, down = 1e3 * history.position, pen_down(history)[:, None]
     rows = _spread(actual, history.t)
-    if with_wanted:
-        axes.plot(*wanted.T, color=style.BLACK, lw=0.9, ls=(0, (2, 2)), label="wanted", zorder=6)
-        if history.tracks_orientation:
-            free = ~np.isfinite(history.wanted_normal[rows]).all(axis=1)
-            rows_wanted = rows[~free]
-            arrows(
-                axes,
-                wanted[rows_wanted],
-                -history.wanted_normal[rows_wanted],
-                1.25 * length,
-                color=style.BLACK,
-                lw=0.7,
-                label="wanted end axis",
-                zorder=2,
-            )
-    axes.plot(*actual.T, **look, label=name, zorder=4)
+    axes.plot(*np.where(down, np.nan, actual).T, color=look["color"], lw=0.4, zorder=4)
+    axes.plot(*np.where(down, actual, np.nan).T, **look, label=name, zorder=4)
     label = "end axis" if name == "actual" else None
     arrows(
         axes, actual[rows], -history.normal[rows], length, color=look["color"], lw=1.0, label=label, zorder=5

@@ -26,7 +26,7 @@ def draw(histories: Sequence[History]) -> Figure:
     if len(histories) == 1:
         share = 100.0 * float(np.mean(histories[0].saturated.any(axis=1)))
         said = number(share, "% of the steps")
-        panels[0].set_title(f"at the speed limit (x): {said}", loc="left", fontsize=7)
+        panels[0].set_title(f"at the speed limit (x): {said}", loc="left", fontsize="small")
     return figure
 
 

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
 from tcrctl.analysis.references import shared
+from tcrctl.plots.look import USUAL, Look
 from tcrctl.signals import Array
 
 BLACK: Final = "#000000"
@@ -29,44 +30,42 @@ COLOURS: Final = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, BLACK)
 #: Colour is never the only difference between two lines. 7 colours and 4 dashes make 28 styles.
 DASHES: Final[tuple[Any, ...]] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.5, 1.2)))
 
-WIDTH_IN: Final = 7.0  # two columns of a journal
+#: Width that heights and legends are made for [in].
+_USUAL_IN: Final = 7.0
+_USUAL_PT: Final = 9.0
 _STYLE: Final[Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": "#404040",
     "axes.grid": True,
-    "axes.labelsize": 9,
-    "axes.linewidth": 0.8,
     "axes.prop_cycle": cycler(color=COLOURS),
-    "axes.titlesize": 9,
     "figure.dpi": 100,
-    "font.family": "DejaVu Sans",  # comes with matplotlib, so that every machine draws the same
-    "font.size": 9,
     "grid.color": "#dddddd",
     "grid.linewidth": 0.5,
-    "legend.fontsize": 8,
     "legend.frameon": False,
-    "lines.linewidth": 1.2,
     "pdf.fonttype": 42,  # text stays text
     "savefig.dpi": 200,
     "svg.fonttype": "none",
     "svg.hashsalt": "tcrctl",  # the same figure is the same file
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
 }
 
 
 @contextmanager
-def printed() -> Iterator[None]:
+def printed(look: Look = USUAL) -> Iterator[None]:
     """Let figures be drawn and saved in this style in the ``with`` body; the user's own style is left alone."""
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE)
+        mpl.rcParams.update(_STYLE | look.rc())
         yield
 
 
 def new_figure(height_in: float) -> Figure:
-    """Empty figure as wide as a printed page; no window, no global state."""
-    return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    """Empty figure as wide as asked, taller for larger text; no window, no global state."""
+    taller = max(1.0, mpl.rcParams["font.size"] / _USUAL_PT)
+    return Figure(figsize=(_width_in(), height_in * taller), layout="constrained")
+
+
+def _width_in() -> float:
+    return float(mpl.rcParams["figure.figsize"][0])
 
 
 def time_panels(count: int, *, height_in: float = 1.5, columns: int = 1) -> tuple[Figure, list[Axes]]:
@@ -134,7 +133,8 @@ def legend(figure: Figure, panels: Sequence[Axes]) -> None:
         handles, names = panel.get_legend_handles_labels()
         found |= {name: handle for name, handle in zip(names, handles, strict=True) if name not in found}
     if found:
-        columns = min(len(found), 8 if max(map(len, found)) < 12 else 3)
+        room = _width_in() / _USUAL_IN * _USUAL_PT / mpl.rcParams["font.size"]
+        columns = max(1, min(len(found), int(room * (8 if max(map(len, found)) < 12 else 3))))
         figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=columns)
 
 
@@ -156,7 +156,7 @@ def limit(panel: Axes, values: Array, bounds: Sequence[float | None], name: str,
         text = f"±{known[1]:g}" if known[0] == -known[-1] else " to ".join(f"{bound:g}" for bound in known)
         said = panel.get_title(loc="right")
         note = f"{said}{', ' if said else ''}{name} {text} {unit}".replace("-", "−")
-        panel.set_title(note, loc="right", fontsize=7, color="#505050")
+        panel.set_title(note, loc="right", fontsize="small", color="#505050")
 
 
 def _is_near(bound: float, values: Array) -> bool:
@@ -179,7 +179,7 @@ def _draw_limit(panel: Axes, bound: float, text: str) -> None:
         textcoords="offset points",
         ha="right",
         va="bottom" if bound >= 0 else "top",
-        fontsize=7,
+        fontsize="small",
         color="#505050",
         bbox={"fc": "white", "ec": "none", "alpha": 0.75, "pad": 0.6},
         zorder=5,

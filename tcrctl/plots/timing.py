@@ -26,7 +26,7 @@ def draw(histories: Sequence[History]) -> Figure:
     compute = [1e3 * history.compute for history in histories]
     _row(rows[0], histories, compute, "control time [ms]")
     period = 1e3 * float(np.median(histories[0].period))
-    rows[0][1].set_title(f"period {period:g} ms", loc="right", fontsize=7)
+    rows[0][1].set_title(f"period {period:g} ms", loc="right", fontsize="small")
     if paced:
         _row(rows[1], paced, [1e3 * history.lateness for history in paced], "lateness [ms]")
     rows[-1][0].set_xlabel("t [s]")

@@ -43,12 +43,12 @@ class WhatIf:
         above, below = figure.subplots(2, 1, sharex=True)
         for cable in range(was.shape[1] if was.ndim == 2 else 0):
             colour = _COLOURS[cable % len(_COLOURS)]
-            above.plot(t, was[:, cable], color=colour, linewidth=1.0, label=f"cable {cable + 1}")
+            above.plot(t, was[:, cable], color=colour, linewidth=1.0, label=f"c{cable + 1}")
             above.plot(t, now[:, cable], color=colour, linewidth=1.0, linestyle="--")
             below.plot(t, now[:, cable] - was[:, cable], color=colour, linewidth=1.0)
         above.set_ylabel("wanted drive speed [mm/s]\nrecorded solid, replayed dashed")
         below.set_ylabel("replayed - recorded [mm/s]")
-        below.set_xlabel("time [s]")
+        below.set_xlabel("t [s]")
         if above.lines:
             above.legend(ncols=3, fontsize="small")
         for axes in (above, below):

@@ -30,7 +30,7 @@ from tcrctl.plant.stroke import within_stroke
 from tcrctl.replay.environment import Change, changes, plugin_changes
 from tcrctl.replay.rebuild import Origin, rebuild
 from tcrctl.replay.replayed_log import open_replayed
-from tcrctl.replay.result import ALL_STEPS, EXACT, Replay, Tolerance, Window
+from tcrctl.replay.result import ALL_STEPS, EXACT, Replay, Tolerance, Window, what_if
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.signals import StepRecord
 from tcrctl.trajectory.start_blend import StartBlend
@@ -204,7 +204,8 @@ class _Replay:
         stopped = ended if isinstance(ended, str) else ""
         reason = ""
         if found.first is not None:
-            reason = str(found.first)
+            changed = self._origin.wanted is not self._origin.recorded
+            reason = what_if(found.deviations) if changed else str(found.first)
         elif stopped:
             reason = f"the replay was stopped, the recorded run went on: {stopped}"
         elif gap:

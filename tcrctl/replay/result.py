@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from tcrctl.errors import InputError
+from tcrctl.experiment.headline import number
 from tcrctl.log.comparison import Deviation, Difference
 from tcrctl.replay.environment import Change
 
@@ -98,6 +100,20 @@ class Replay:
             "seconds": self.seconds,
             "out": None if self.out is None else str(self.out),
         }
+
+
+def what_if(deviations: Mapping[str, Deviation]) -> str:
+    """Say what other settings would have commanded, given the same input.
+
+    Args:
+        deviations: What differs, by path; at least one quantity.
+    """
+    speed = deviations.get("wanted.speed")
+    if speed is None:
+        other = next(iter(deviations.values()))
+        return f"the command would be the same; {other.field} would differ from step {other.first_step} on"
+    most = number(1e3 * speed.largest, "mm/s")
+    return f"the command would differ from step {speed.first_step} on by at most {most}"
 
 
 def checked_window(first: int | None, last: int | None) -> Window:

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from support import records
 from support.log_files import open_log
 from support.log_mutants import starts
-from tcrctl.analysis.export import export_csv, export_parquet
+from tcrctl.analysis.export import export_log
 from tcrctl.analysis.info import inspect
 from tcrctl.analysis.result import run_result
 from tcrctl.cli.export import export
@@ -104,8 +104,9 @@ def test_info_prints_a_table_that_names_failed_criteria(log):
     assert code == 0
     assert "50 at 20 Hz" in out
     assert records.START["run_id"] in out
-    (line,) = [line for line in out.splitlines() if "orientation_error_deg.max" in line]
-    assert "FAILED: 9.876 deg" in line
+    first, last = [line for line in out.splitlines() if "orientation_error_deg.max" in line]
+    assert "FAILED: orientation_error_deg.max is 9.876 deg" in first
+    assert "FAILED: 9.876 deg" in last
 
 
 def test_info_measures_jitter_lateness_and_lost_steps(tmp_path):
@@ -228,7 +229,7 @@ def test_recover_exits_3_if_lossy_and_0_if_not(log, cut, tmp_path):
 def test_a_csv_reads_back_as_the_logged_bits(log, tmp_path):
     out = tmp_path / "all.csv"
     code, printed, _ = tcrctl("export", log, "--csv", "--nodes", "-o", out)
-    assert (code, printed.strip()) == (0, str(out))
+    assert (code, printed.split()) == (0, [str(out), str(tmp_path / "all.events.csv")])
     with open(out, newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == N_STEPS
@@ -250,9 +251,12 @@ def test_a_csv_reads_back_as_the_logged_bits(log, tmp_path):
 
 
 def test_a_csv_without_nodes_is_narrow_and_has_unique_names(log, tmp_path):
-    names = export_csv(log, tmp_path / "narrow.csv")
+    names = export_log(log, "csv", tmp_path / "narrow.csv").names
     assert len(set(names)) == len(names) < 100
-    assert not any("estimate_q" in name for name in names)
+    assert not any("estimate_q" in name or "ahead" in name for name in names)
+    more = export_log(log, "csv", tmp_path / "ahead.csv", ahead=True).names
+    assert set(more) > set(names)
+    assert all(name.startswith("reference_ahead_") for name in set(more) - set(names))
 
 
 def test_an_npz_holds_every_quantity_as_logged(log):
@@ -261,7 +265,7 @@ def test_an_npz_holds_every_quantity_as_logged(log):
         assert arrays["estimate_q_m"].shape == (N_STEPS, 48)
         assert list(arrays["cable_names"]) == ["c1", "c2", "c3"]
         raw = sum(name.startswith("measurement_raw_") for name in COLUMNS)  # no camera frames in simulation
-        assert len(arrays.files) == len(COLUMNS) - raw + 3
+        assert len(arrays.files) == len(COLUMNS) - raw + 3 + 2 + 4  # names, errors, events
         for k in range(N_STEPS):
             step = records.record(k)
             assert arrays["truth_q_m"][k].tobytes() == step.truth.q.tobytes()
@@ -273,7 +277,7 @@ def test_a_parquet_file_has_the_columns_and_bits_of_the_csv(log, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     assert tcrctl("export", log, "--parquet", "--nodes")[0] == 0
     table = parquet.read_table(log.with_suffix(".parquet"))
-    assert table.column_names == export_csv(log, tmp_path / "all.csv", nodes=True)
+    assert tuple(table.column_names) == export_log(log, "csv", tmp_path / "all.csv", nodes=True).names
     for name, expected in (("t_s", lambda s: s.t), ("applied_speed_c2_m_s", lambda s: s.applied.speed[1])):
         assert table[name].to_pylist() == [expected(records.record(k)) for k in range(N_STEPS)]
     assert str(table.schema.field("measurement_nodes_m1_n1_x_m").type) == "float"
@@ -283,13 +287,13 @@ def test_a_parquet_file_has_the_columns_and_bits_of_the_csv(log, tmp_path):
 def test_parquet_without_its_package_names_what_to_install(log, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(InputError, match="pyarrow") as caught:
-        export_parquet(log, log.with_suffix(".parquet"))
+        export_log(log, "parquet", log.with_suffix(".parquet"))
     assert "tcrctl[parquet]" in caught.value.hint
     assert not log.with_suffix(".parquet").exists()
 
 
 def test_an_unfinished_log_exports_what_it_has(cut, tmp_path):
-    export_csv(cut, tmp_path / "cut.csv")
+    export_log(cut, "csv", tmp_path / "cut.csv")
     with open(tmp_path / "cut.csv", newline="") as stream:
         assert len(list(csv.reader(stream))) == 1 + inspect(cut).steps
 
@@ -298,12 +302,12 @@ def test_export_replaces_a_file_only_when_forced(log, tmp_path):
     out = tmp_path / "precious.csv"
     out.write_text("mine")
     with pytest.raises(InputError, match="exists"):
-        export_csv(log, out)
+        export_log(log, "csv", out)
     assert out.read_text() == "mine"
     assert tcrctl("export", log, "--csv", "-o", out, "--force")[0] == 0
     assert out.read_text() != "mine"
     with pytest.raises(LogError):
-        export_csv(log, tmp_path / "missing" / "out.csv")
+        export_log(log, "csv", tmp_path / "missing" / "out.csv")
 
 
 @pytest.mark.parametrize("verb", [["info"], ["recover"], ["export", "--csv"]])
@@ -334,7 +338,7 @@ def test_export_wants_one_format(log):
     assert tcrctl("export", log, "--csv", "--npz")[0] == 2
 
 
-@pytest.mark.parametrize("form", ["--csv", "--npz", "--parquet"])
+@pytest.mark.parametrize("form", ["--csv", "--npz", "--parquet", "--mat"])
 def test_a_log_without_steps_is_an_empty_table(form, log, tmp_path):
     data = log.read_bytes()
     path, out = tmp_path / "killed.mcap", tmp_path / "out"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ from tcrctl import __version__
 from tcrctl.cli import app
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.experiment.spec import ExperimentSpec, load_spec
+from tcrctl.robot.description import RobotDescription, load_robot
 
 Output = pytest.CaptureFixture[str]
 
@@ -44,6 +46,23 @@ def test_show_prints_robots_too(capsys: Output) -> None:
     assert app.main(["show", "--robot", "tcr700", "--json", "--set", "tip.ring=8"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["name"], found["tip"]["ring"]) == ("tcr700", 8)
+
+
+def test_show_keeps_the_comments_of_a_robot_file(capsys: Output, tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(
+        shipped.robots()["tcr700"].read_text() + "friction:  # ours\n  coefficient: 0.1 # a guess\n"
+    )
+    overrides = ["tip.ring=8", "cables.lead_mm=120", "friction.coefficient=0.2", "base.tilt_deg=[1, 0]"]
+    for given in ((), overrides[:1], overrides):
+        arguments = [part for one in given for part in ("--set", one)]
+        assert app.main(["show", "--robot", str(mine), *arguments]) == 0
+        shown = capsys.readouterr().out
+        assert strict_yaml.validate(strict_yaml.loads(shown), RobotDescription) == load_robot(
+            str(mine), overrides=given
+        )
+        comments = [line.partition("#")[2] for line in mine.read_text().splitlines() if "#" in line]
+        assert [line.partition("#")[2] for line in shown.splitlines() if "#" in line] == comments
 
 
 def test_validate_goes_through_all_files_and_lists_all_problems(capsys: Output, tmp_path: Path) -> None:
@@ -92,6 +111,23 @@ def test_new_keeps_a_robot_file_of_ones_own_in_reach(tmp_path: Path, monkeypatch
     Path("first.yaml").write_text(text.replace("robot: tcr600", "robot: robots/own.yaml"))
     assert app.main(["new", "sub/second", "--from", "first.yaml"]) == 0
     assert load_spec("sub/second.yaml").robot_path.resolve() == Path("robots/own.yaml").resolve()
+
+
+def test_a_new_robot_says_behind_every_key_what_it_means(
+    capsys: Output, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert app.main(["new", "--robot", "mine", "--from", "tcr700"]) == 0
+    assert capsys.readouterr().out == "mine.yaml\n"
+    assert load_robot("mine.yaml").model_copy(update={"name": "tcr700"}) == load_robot("tcr700")
+    lines = Path("mine.yaml").read_text().splitlines()
+    keys = [line for line in lines if re.match(r" *\w+:", line) and not line.startswith("name:")]
+    assert len(keys) > 20
+    assert all(" # " in line for line in keys)
+    before = Path("mine.yaml").read_bytes()
+    assert app.main(["new", "--robot", "mine"]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert Path("mine.yaml").read_bytes() == before
 
 
 @pytest.mark.parametrize("name", ["a b", "/proc/nowhere/x"])
@@ -204,4 +240,6 @@ def test_the_module_runs_as_a_program_and_without_colour_off_a_terminal() -> Non
         assert done.returncode == code
         assert "\x1b" not in done.stdout + done.stderr
         if code == 0:
-            assert done.stdout == f"tcrctl {__version__}\n"
+            assert re.fullmatch(
+                rf"tcrctl {re.escape(__version__)}( \(commit [0-9a-f]{{12}}\))?\n", done.stdout
+            )

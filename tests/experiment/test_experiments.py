@@ -40,8 +40,8 @@ def test_a_dry_run_writes_nothing_and_says_what_a_run_would_do(tmp_path, monkeyp
     assert said["status"] == "success"
     assert said["steps"] * 0.05 == pytest.approx(said["duration_s"])
     assert said["feasibility"]["tension_n"]["min"] > 1.0
+    assert main(["run", "letter_t", "--dry-run"]) == 0
+    assert f"{said['steps']} steps" in capsys.readouterr().out
     assert main(["run", "letter_t", "--dry-run", "--quiet"]) == 0
-    printed = capsys.readouterr()
-    assert f"{said['steps']} steps" in printed.out
-    assert printed.err == ""
+    assert capsys.readouterr() == ("", "")
     assert list(tmp_path.iterdir()) == []

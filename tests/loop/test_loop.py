@@ -140,7 +140,12 @@ def test_failures_of_estimator_and_controller_add_up():
 def test_a_position_error_beyond_the_limit_holds_the_drives_and_stops(offset):
     records, error = loop(estimator=FakeEstimator(offset={6: offset}))
     assert isinstance(error, SafetyLimitError)
-    assert (error.step, error.quantity, error.unit, error.limit) == (6, "position error", "mm", 60.0)
+    assert (error.step, error.quantity, error.unit, error.limit) == (
+        6,
+        "estimated position error",
+        "mm",
+        60.0,
+    )
     assert error.value == pytest.approx(1e3 * abs(offset), nan_ok=True)
     assert len(records) == 7
     assert held(records[-1])

@@ -203,11 +203,12 @@ def test_the_command_prints_one_object_and_exits_with_3_if_a_bar_is_missed(tmp_p
     assert made["reason"] == "missed: bad, ugly"
     assert printed.err.count("[") == 3
     assert main(["paper", "--only", "good", "--quiet", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert main(["paper", "--only", "good", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr()
     assert "1 of 1 bars met" in printed.out
-    assert printed.err == ""
     folders = list(tmp_path.iterdir())
-    assert len(folders) == 2
+    assert len(folders) == 3
     assert all({"paper.md", "paper.json"} <= {p.name for p in folder.iterdir()} for folder in folders)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -23,6 +24,7 @@ from tcrctl.experiment.run import log_geometry
 from tcrctl.experiment.spec import load_spec
 from tcrctl.numerics.rotation import angle_between, angles_from_normal
 from tcrctl.plots import FIGURES, draw, save
+from tcrctl.plots.look import Look
 from tcrctl.robot.robot import Robot
 
 pytestmark = pytest.mark.slow
@@ -117,7 +119,8 @@ def test_the_command_writes_every_figure(tmp_path, capsys):
     log = str(write(tmp_path / "log.mcap", turning, steps=range(20)))
     assert main(["plot", log]) == 0
     printed = capsys.readouterr().out.split()
-    assert printed == [str(tmp_path / "plots" / f"{name}.png") for name in FIGURES]
+    shown = [name for name in FIGURES if name not in ("task", "comparison")]  # it has no task, and is one run
+    assert printed == [str(tmp_path / "plots" / f"{name}.png") for name in shown]
     assert all(len(colours(path)) > 20 for path in printed)
 
 
@@ -303,3 +306,62 @@ def test_the_skeleton_is_that_of_the_robot_in_the_log(pose, several, tcr600: Rob
         assert_allclose(ours.weights, theirs.weights)
     assert read_structure(pose[0].log, 44) is None
     assert read_structure(several[2].log, 48) is None
+
+
+@pytest.mark.parametrize(
+    "verb", [["plot", "-f", "error"], ["report"], ["export", "--csv"]], ids=lambda v: v[0]
+)
+def test_verbs_that_write_files_treat_those_that_exist_alike(tmp_path, capsys, verb):
+    call = [*verb, str(write(tmp_path / "log.mcap", turning, steps=range(5)))]
+    assert main(call) == 0
+    written = Path(capsys.readouterr().out.split()[0])
+    written.write_text("mine")
+    assert main(call) == 2
+    assert capsys.readouterr().err.splitlines()[0] == f"error: {written}: exists already"
+    assert written.read_text() == "mine"
+    assert main([*call, "--force"]) == 0
+    assert written.read_bytes() != b"mine"
+
+
+def test_theta_of_the_end_is_the_one_nearest_to_that_wanted(pose):
+    history = pose[0]
+    away = np.tile([1.0, 0.0, 0.0], (len(history.t), 1))  # where (45) has no theta_x, both turn as they like
+    normal = np.where(np.arange(len(history.t))[:, None] == 7, away, history.normal)
+    turned = dataclasses.replace(history, normal=normal)
+    apart = turned.angles[:, 0] - turned.wanted_angles[:, 0]
+    assert np.abs(apart).max() <= np.pi + 1e-12
+    again = np.column_stack((np.sin(turned.angles[:, 0]), np.cos(turned.angles[:, 0])))
+    alone = orientation_angles(turned.normal)[:, 0]
+    assert_allclose(again, np.column_stack((np.sin(alone), np.cos(alone))), atol=1e-12)
+
+
+@pytest.mark.parametrize(("width_mm", "style"), [(88.0, "paper"), (177.8, "paper"), (177.8, "talk")])
+def test_a_figure_is_as_wide_as_asked(several, folder, width_mm, style):
+    look = Look(width_mm=width_mm, style=style)
+    for name in ("error", "overview", "comparison", "latency"):
+        path = folder / f"{name}_{style}.png"
+        save(draw(name, several, look), path, look)
+        with Image.open(path) as image:
+            assert image.width == pytest.approx(width_mm / 25.4 * 200, abs=1.5)
+
+
+def test_a_look_that_there_is_not_is_an_error(tmp_path, capsys):
+    log = str(write(tmp_path / "log.mcap", turning, steps=range(5)))
+    for options, part in (
+        (["--width-mm", "5"], "from 40 to 1000"),
+        (["--style", "wall"], "paper, talk"),
+        (["--font", "DejaVu Sanz"], "Did you mean DejaVu Sans"),
+    ):
+        assert main(["plot", log, "-f", "error", *options]) == 2
+        assert part in capsys.readouterr().err
+    assert not (tmp_path / "plots").exists()
+
+
+def test_runs_that_wanted_different_things_are_drawn_with_all_of_them(pose):
+    other = dataclasses.replace(pose[0], label="other", wanted_position=pose[0].wanted_position + 0.01)
+    for name, panel in (("overview", -2), ("task", 0), ("path", 0)):
+        same = draw(name, [pose[0], pose[0]]).axes[panel].get_legend_handles_labels()[1]
+        both = draw(name, [pose[0], other]).axes[panel].get_legend_handles_labels()[1]
+        assert [text for text in same if text.startswith("wanted") and "axis" not in text] == ["wanted"]
+        wanted = [text for text in both if text.startswith("wanted, ") and "axis" not in text]
+        assert wanted == [f"wanted, {pose[0].label}", "wanted, other"]

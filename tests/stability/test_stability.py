@@ -295,7 +295,7 @@ def test_the_command_reports_the_same_numbers_in_every_form(tmp_path, capsys):
 
 def test_a_run_that_is_stopped_is_reported_up_to_there(capsys):
     limit = ("safety.position_error_mm=0.001", "trajectory.lead_in_s=0")
-    assert main(["stability", "letter_t", *arguments(*limit), "--points", "1", "--quiet"]) == 4
+    assert main(["stability", "letter_t", *arguments(*limit), "--points", "1"]) == 4
     printed = capsys.readouterr()
     assert "position error" in printed.err
     assert "letter_t" in printed.out

@@ -99,7 +99,7 @@ def test_a_missed_target_fails_its_criterion_with_exit_code_3(tmp_path, capsys):
 def test_the_table_for_people_tells_what_the_task_found(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     overrides = [part for text in (*BELOW, "task.beam_mm=15.999") for part in ("--set", text)]
-    assert main(["run", "laser_pipe", "--quiet", "--out", str(tmp_path), *overrides]) == 3
+    assert main(["run", "laser_pipe", "--out", str(tmp_path), *overrides]) == 3
     printed = capsys.readouterr()
     assert "target low" in printed.out
     assert "the beam does not go through" in printed.out

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tcrctl.cli.console import console, escaped
-
 if TYPE_CHECKING:
     from tcrctl.commissioning.finding import Finding
     from tcrctl.robot.description import RobotDescription
@@ -32,7 +30,9 @@ def flat(value: dict[str, Any], prefix: str = "") -> dict[str, str]:
 def _text(item: Any) -> str:
     if isinstance(item, bool):
         return "yes" if item else "no"
-    return f"{item:.3f}" if isinstance(item, float) else str(item)
+    from tcrctl.experiment.headline import number
+
+    return number(item)
 
 
 def print_rows(title: str, rows: dict[str, str]) -> None:
@@ -45,12 +45,11 @@ def print_rows(title: str, rows: dict[str, str]) -> None:
 
 def print_findings(lines: list[tuple[str, Finding]]) -> None:
     """Print what a check found, by robot."""
-    from rich.table import Table
+    from tcrctl.cli.table import print_table
 
-    table = Table(show_header=False, box=None)
-    for style in ("bold", "", "", ""):
-        table.add_column(style=style, overflow="fold")
-    for robot, finding in lines:
-        verdict = "[green]ok[/green]" if finding.exit_code == 0 else "[red]NOT OK[/red]"
-        table.add_row(escaped(robot), escaped(finding.what), verdict, escaped(finding.text))
-    console().print(table)
+    rows = [
+        (robot, finding.what, "NOT OK" if finding.exit_code else "ok", finding.text)
+        for robot, finding in lines
+    ]
+    styles = ["red" if finding.exit_code else "" for _, finding in lines]
+    print_table(("robot", "check", "verdict", "found"), rows, styles=styles)

@@ -1,0 +1,55 @@
+"""The numbers of several runs beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tcrctl.analysis.history import History
+from tcrctl.experiment.headline import number
+from tcrctl.plots import style
+from tcrctl.signals import Array
+
+
+def draw(histories: Sequence[History]) -> Figure:
+    """Draw errors, tension and control time of every run: rms or median as a dot, the largest as a bar's end."""
+    measures: list[tuple[str, list[Array], Callable[[Array], float]]] = [
+        ("position error [mm]", [1e3 * history.position_error for history in histories], _rms),
+        ("largest tension [N]", [history.tension.max(axis=1) for history in histories], _median),
+        ("control time [ms]", [1e3 * history.compute for history in histories], _median),
+    ]
+    if any(history.tracks_orientation for history in histories):
+        angles = [np.degrees(history.orientation_error) for history in histories]
+        measures.insert(1, ("orientation error [deg]", angles, _rms))
+    figure = style.new_figure(0.9 + 0.35 * len(histories))
+    panels = figure.subplots(1, len(measures), sharey=True, squeeze=False)[0]
+    for panel, (name, values, middle) in zip(panels, measures, strict=True):
+        _draw(panel, values, middle)
+        panel.set_xlabel(f"{name}\ndot: {'rms' if middle is _rms else 'median'}, end: max")
+    panels[0].set_yticks(range(len(histories)), [history.label for history in histories])
+    panels[0].set_ylim(len(histories) - 0.4, -0.6)
+    return figure
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))
+
+
+def _median(values: Array) -> float:
+    return float(np.nanmedian(values))
+
+
+def _draw(panel: Axes, values: Sequence[Array], middle: Callable[[Array], float]) -> None:
+    for i, found in enumerate(values):
+        if not np.isfinite(found).any():
+            continue
+        most, usual, colour = float(np.nanmax(found)), float(middle(found)), style.line(i)["color"]
+        panel.plot([0.0, most], [i, i], color=colour, lw=3.0, alpha=0.5, solid_capstyle="butt")
+        panel.plot([usual], [i], color=colour, marker="o", ms=4, ls="")
+        beside = {"xytext": (3, 0), "textcoords": "offset points", "va": "center", "fontsize": "x-small"}
+        panel.annotate(number(most), (most, i), **beside)  # type: ignore[arg-type]
+    panel.margins(x=0.3)
+    panel.set_xlim(left=0.0)

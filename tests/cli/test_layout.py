@@ -1,0 +1,121 @@
+"""Tables at every width: all that they hold is there, words are whole, and lines fit into the terminal."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from support import records
+from support.log_files import open_log
+from tcrctl.cli import paper
+from tcrctl.cli.app import main
+from tcrctl.cli.layout import fact, laid_out
+from tcrctl.paper.report import Line, make_line
+from tcrctl.paper.table import ROWS
+
+WORDS = st.text("abcdefgh", min_size=1, max_size=12)
+CELLS = st.lists(WORDS, max_size=12).map(" ".join)
+REASON = "letter_t: safety stop at step 3: estimated position error is 80.1 mm, limit 60 mm"
+
+
+def words(lines):
+    return [word for line in lines for word in line.split()]
+
+
+def fits(lines, columns):
+    return all(len(line) <= columns or len(line.split()) == 1 for line in lines)
+
+
+@given(st.data(), st.integers(1, 5), st.integers(15, 130))
+def test_every_word_is_there_and_no_line_is_too_long(data, count, columns):
+    row = st.lists(CELLS, min_size=count, max_size=count)
+    titles = data.draw(st.lists(WORDS, min_size=count, max_size=count))
+    rows = data.draw(st.lists(row, min_size=1, max_size=5))
+    head, bodies = laid_out(titles, rows, columns)
+    assert len(bodies) == len(rows)
+    for cells, lines in zip(rows, bodies, strict=True):
+        said = words(lines)
+        assert all(said.count(word) >= words(cells).count(word) for word in words(cells))
+        assert head == [] or sorted(said) == sorted(words(cells))
+        if head or all(len(title) < 6 for title in titles):
+            assert all(len(line) <= columns or len(line.split()) <= 2 for line in [*head, *lines])
+
+
+@given(st.lists(CELLS, min_size=2, max_size=4), st.integers(0, 3))
+def test_without_a_width_every_row_is_one_line(row, right):
+    head, (lines,) = laid_out(["a"] * len(row), [row], None, [right])
+    assert (len(head), len(lines)) == (1, 1)
+    assert words(lines) == words(row)
+
+
+@given(WORDS, CELLS, st.integers(20, 100))
+def test_what_belongs_to_a_name_stays_beside_it(name, text, columns):
+    lines = fact(name, text, 14, columns)
+    assert words(lines) == [name, *text.split()]
+    assert fits(lines, columns)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("logs") / "log.mcap"
+    criterion = {
+        "name": "position_error_mm.max",
+        "relation": "<=",
+        "limit": 3.0,
+        "value": 9.876543,
+        "unit": "mm",
+    }
+    summary = json.dumps({"status": "failed", "criteria": [{**criterion, "passed": False}]})
+    with open_log(path) as writer:
+        for k in range(5):
+            writer.step(records.record(k))
+        writer.finish({"status": "failed", "reason": "a criterion failed", "summary": summary})
+    return path
+
+
+def said(capsys, call):
+    assert main(call) == 0
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("terminal", [{}, {"NO_COLOR": "1"}, {"TERM": "dumb"}], ids=str)
+@pytest.mark.parametrize("columns", [60, 80, 120])
+def test_verbs_keep_to_the_width_of_the_terminal(columns, terminal, log, capsys, monkeypatch):
+    wide = {}
+    calls = [["list"], ["kinds"], ["export", "--columns"], ["info", str(log)]]
+    monkeypatch.delenv("COLUMNS", raising=False)
+    for call in calls:
+        wide[call[0]] = words(said(capsys, call).splitlines()[1:])
+    monkeypatch.setenv("COLUMNS", str(columns))
+    for name, value in terminal.items():
+        monkeypatch.setenv(name, value)
+    for call in calls:
+        lines = said(capsys, call).splitlines()
+        assert all(len(line) <= columns or len(line.split()) <= 2 for line in lines), call
+        assert set(wide[call[0]]) <= set(words(lines)) | {word.rstrip(":") for word in words(lines)}, call
+        assert "\x1b" not in "".join(lines)
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120])
+def test_paper_says_first_what_failed_and_breaks_no_words(columns, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    lines = [make_line(row, {}) for row in ROWS[:6]]
+    lines[3] = Line(ROWS[3], None, "failed", REASON, "", ())
+    report = SimpleNamespace(lines=lines, notes=lambda: ["A note."], folder="logs/x")
+    paper._print_table(report)
+    printed = capsys.readouterr().out.splitlines()
+    assert fits(printed, columns)
+    text = [" ".join(line.cells()) for line in lines]
+    assert set(words(text)) <= set(words(printed))
+    first = ROWS[3].work.split()[0]
+    assert next(line for line in printed if not line.startswith(("work", " "))).startswith(first)
+
+
+def test_info_says_what_failed_right_after_the_status_to_four_digits(log, capsys):
+    lines = said(capsys, ["info", str(log)]).splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("status"))
+    assert lines[at + 1].split(None, 1)[1] == "FAILED: position_error_mm.max is 9.877 mm, must be <= 3 mm"
