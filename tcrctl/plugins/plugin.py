@@ -23,7 +23,7 @@ from tcrctl.config.settings import Settings
 from tcrctl.errors import InputError
 from tcrctl.plugins.groups import package_of, registered
 from tcrctl.plugins.origin import Origin
-from tcrctl.plugins.source import from_file, from_module
+from tcrctl.plugins.source import from_file, from_module, is_file
 
 Find = Callable[[str], Path]
 Line = tuple[type[Settings], Callable[..., Any]]
@@ -66,10 +66,9 @@ def settings_of(section: str, kind: str, base: type[Settings], find: Find) -> ty
     """
     if is_written_out(kind):
         place, _, name = kind.rpartition(":")
-        is_file = place.endswith(".py") or "/" in place or "\\" in place
         line, origin = (
             from_file(section, kind, find(place), name)
-            if is_file
+            if is_file(place)
             else from_module(section, kind, place, name)
         )
     else:
