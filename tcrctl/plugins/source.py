@@ -35,7 +35,23 @@ def from_file(section: str, kind: str, path: Path, name: str) -> tuple[Any, Orig
     text, place = strict_yaml.read(path), str(path.absolute())
     digest = hashlib.sha256(text).hexdigest()
     found = _member(what, _module_of(what, place, text), name)
-    return found, Origin(section, kind, "", place, "", "", digest, text)
+    return found, Origin(section, kind, name, "", place, "", "", digest, text)
+
+
+def again(origin: Origin) -> Any:
+    """Return the kind that an origin tells of, in another process: a file as it was read, not as it is now.
+
+    Args:
+        origin: Where the kind comes from.
+
+    Raises:
+        InputError: If it is a module that cannot be imported here, or does not define it any more.
+    """
+    if not origin.text:
+        module = _imported(origin.what, origin.module)
+    else:
+        module = _module_of(origin.what, origin.file, origin.text)
+    return _member(origin.what, module, origin.name)
 
 
 def function_in(what: str, place: str, name: str, find: Callable[[str], Path]) -> tuple[Any, str]:
@@ -101,7 +117,7 @@ def from_module(section: str, kind: str, module: str, name: str) -> tuple[Any, O
     file = getattr(found, "__file__", None) or ""
     package, version = _distribution(module.partition(".")[0])
     digest = _digest(module.partition(".")[0])
-    return _member(what, found, name), Origin(section, kind, module, file, package, version, digest)
+    return _member(what, found, name), Origin(section, kind, name, module, file, package, version, digest)
 
 
 def _imported(what: str, module: str) -> ModuleType:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib
 import json
 import re
@@ -91,13 +92,17 @@ def test_it_is_listed_runs_as_written_and_is_replayed_bit_for_bit(guide, capsys)
 
 @pytest.mark.slow
 def test_it_is_swept(guide, capsys):
-    guide()
+    folder = guide()
     gains = "controller.gain_1_s=0.5,1.5"
     code, out, _ = told(
         capsys, "sweep", "mine.yaml", *SHORT, "--set", gains, "--seeds", "0..1", "--jobs", "1", "--json"
     )
     assert code == 0, out
-    assert json.loads(out)["status"] == "success"
+    (table,) = folder.glob("logs/*/table.csv")
+    with table.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["status"] for row in rows] == ["success"] * 4, rows
+    assert len({row["position_error_mm.max"] for row in rows}) == 4
 
 
 #: What is replaced in the guide's files, exit code, and what is said.
