@@ -25,6 +25,7 @@ from tcrctl.plugins.faults import told
 from tcrctl.plugins.groups import GROUPS, registered
 from tcrctl.plugins.origin import Origin
 from tcrctl.plugins.plugin import is_written_out, made_again, plugin_of, settings_of
+from tcrctl.task.section import TaskSection
 from tcrctl.trajectory.section import TrajectorySection
 
 Model = TypeVar("Model", bound=Settings)
@@ -36,6 +37,7 @@ BASES: Final[Mapping[str, type[Settings]]] = {
     "controller": OwnControllerSection,
     "estimator": EstimatorSection,
     "plant": PlantSection,
+    "task": TaskSection,
 }
 
 
@@ -154,7 +156,8 @@ def with_registered(model: type[Model]) -> type[Model]:
 
 def origins(spec: Settings) -> tuple[Origin, ...]:
     """Return where the kinds of an experiment come from that are not built in, in the order of its sections."""
-    found = (plugin_of(getattr(spec, section)) for section in GROUPS)
+    named = (getattr(spec, section) for section in GROUPS)
+    found = (plugin_of(settings) for settings in named if settings is not None)  # most runs have no task
     return tuple(plugin.origin for plugin in found if plugin is not None)
 
 
