@@ -55,6 +55,7 @@ _API = {
     "Simulation": "tcrctl.api.running",
     "load": "tcrctl.api.recorded",
     "Run": "tcrctl.api.recorded",
+    "Robot": "tcrctl.api.robot",
 }
 
 watch_imports()

@@ -15,6 +15,8 @@ estimator    EstimatorSection        settings, robot, period [s]        ``update
 plant        PlantSection            settings, robot, period [s], seed  ``read()``: Measurement; ``write(command)``:
                                                                         Command; ``close()``; ``start()``,
                                                                         ``truth()`` if it has
+task         TaskSection             settings, targets, rod             ``observe(step)``: list of Event;
+                                     diameter [m]                       ``result()``: dict, in JSON
 ===========  ======================  =================================  ===========================================
 """
 
@@ -23,6 +25,7 @@ from __future__ import annotations
 from tcrctl.config.settings import NotNegative, OrOff, Positive, Settings, Vector, quantity
 from tcrctl.controller.settings import OwnControllerSection
 from tcrctl.estimator.section import EstimatorSection
+from tcrctl.log.event import Event
 from tcrctl.plant.settings import PlantSection
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import (
@@ -32,16 +35,21 @@ from tcrctl.signals import (
     Estimate,
     Measurement,
     Reference,
+    StepRecord,
     Truth,
 )
+from tcrctl.task.section import TaskSection
+from tcrctl.trajectory.pose_path import EndPose
 from tcrctl.trajectory.section import TrajectorySection
 
 __all__ = [
     "Array",
     "Command",
     "ControlInfo",
+    "EndPose",
     "Estimate",
     "EstimatorSection",
+    "Event",
     "Measurement",
     "NotNegative",
     "OrOff",
@@ -51,6 +59,8 @@ __all__ = [
     "Reference",
     "Robot",
     "Settings",
+    "StepRecord",
+    "TaskSection",
     "TrajectorySection",
     "Truth",
     "Vector",

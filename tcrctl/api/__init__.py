@@ -1,1 +1,1 @@
-"""The program from Python: :func:`tcrctl.run`, :func:`tcrctl.load` and :func:`tcrctl.simulate`."""
+"""The program from Python: runs and their logs, plants step by step, and robots at rest; see :mod:`tcrctl`."""

@@ -10,7 +10,7 @@ from tcrctl.cli.table import print_table
 
 
 def kinds(as_json: AsJson = False) -> None:
-    """List the kinds of trajectory, controller, estimator and plant: built in, or registered by a package.
+    """List the kinds of trajectory, controller, estimator, plant and task: built in, or registered by a package.
 
     An experiment may also name a module or a file: kind: my_package:NAME or
     kind: ./my_file.py:NAME.

@@ -9,6 +9,7 @@ import numpy as np
 from tcrctl.controller.settings import OwnControllerSection, speed_limit
 from tcrctl.errors import PluginStoppedError
 from tcrctl.plugins.faults import built, called, refuse_lacking
+from tcrctl.plugins.handed import handed
 from tcrctl.plugins.plugin import Plugin
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
@@ -46,7 +47,7 @@ class OwnController:
         Raises:
             PluginStoppedError: If it raises, or returns something else.
         """
-        found = called(self._origin, "control", self._made.control, estimate, reference)
+        found = called(self._origin, "control", self._made.control, handed(estimate), handed(reference))
         asked, info = found if isinstance(found, tuple) and len(found) == 2 else (found, None)
         if isinstance(asked, Command):
             speed, drive = (self._vector(name, getattr(asked, name)) for name in ("speed", "drive"))

@@ -10,6 +10,7 @@ import numpy as np
 from tcrctl.errors import PluginStoppedError
 from tcrctl.estimator.section import EstimatorSection
 from tcrctl.plugins.faults import built, called, refuse_lacking
+from tcrctl.plugins.handed import handed
 from tcrctl.plugins.plugin import Plugin
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, Estimate, Measurement
@@ -42,7 +43,7 @@ class OwnEstimator:
         Raises:
             PluginStoppedError: If it raises, or returns something else.
         """
-        found = called(self._origin, "update", self._made.update, measured, applied)
+        found = called(self._origin, "update", self._made.update, handed(measured), handed(applied))
         if not isinstance(found, Estimate):
             raise self._refused(f"a {type(found).__name__}, not an Estimate")
         arrays: dict[str, Any] = {name: self._vector(name, found, size) for name, size in self._sizes.items()}

@@ -16,8 +16,8 @@ from typing import Any, Final
 from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, load_spec
-from tcrctl.experiment.table_file import kept_name
 from tcrctl.log.file_names import DESIGNED, RESOLVED, RIG, ROBOT
+from tcrctl.trajectory.table_settings import kept_name
 
 #: Keys that name files, and the file beside the resolved experiment that is meant.
 _NAMED: Final = {"robot": ROBOT, "plant.robot": DESIGNED, "plant.rig": RIG}

@@ -114,8 +114,8 @@ def check_feasibility(trajectory: Trajectory, robot: Robot, limits: DriveLimits)
     Raises:
         InfeasibleError: If something breaks a limit, with the first time at which it does.
     """
-    count, m = 1 + max(1, int(np.ceil(trajectory.duration / INTERVAL))), robot.n_cables
-    times = np.linspace(0.0, trajectory.duration, count)
+    times, m = _times(trajectory), robot.n_cables
+    count = times.size
     position, normal = trajectory.position(times), trajectory.normal(times)
     held = Held(np.zeros(m), robot.rest)
     path = StaticPath(times, np.zeros((count, m)), np.zeros((count, m)), np.zeros(count))
@@ -139,8 +139,8 @@ def check_drives(trajectory: Trajectory, robot: Robot, limits: DriveLimits) -> S
         InfeasibleError: If something breaks a limit, with the first time at which it does.
         NoEquilibriumError: If the robot has no stable shape with some of the drives.
     """
-    count, m = 1 + max(1, int(np.ceil(trajectory.duration / INTERVAL))), robot.n_cables
-    times = np.linspace(0.0, trajectory.duration, count)
+    times, m = _times(trajectory), robot.n_cables
+    count = times.size
     drives = drives_of(trajectory, times)
     assert drives is not None
     path = StaticPath(times, drives, np.zeros((count, m)), np.zeros(count))
@@ -150,6 +150,12 @@ def check_drives(trajectory: Trajectory, robot: Robot, limits: DriveLimits) -> S
         q, before, path.tension[i] = shape.q, drive, shape.tension
         _check_sample(path, i, 6, robot, limits)
     return path
+
+
+def _times(trajectory: Trajectory) -> Array:
+    """Return the times of the samples (n,) [s]; a wave says how close they must be to show its speed."""
+    interval = min(INTERVAL, getattr(trajectory, "interval", INTERVAL))
+    return np.linspace(0.0, trajectory.duration, 1 + max(1, int(np.ceil(trajectory.duration / interval))))
 
 
 def hold_pose(robot: Robot, target: Array, start: Held, limits: DriveLimits) -> tuple[Held, float]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, partialmethod
 from pathlib import Path
 from typing import Any, Final, TypeVar, Union
 
@@ -24,7 +24,8 @@ from tcrctl.plant.settings import PlantSection
 from tcrctl.plugins.faults import told
 from tcrctl.plugins.groups import GROUPS, registered
 from tcrctl.plugins.origin import Origin
-from tcrctl.plugins.plugin import is_written_out, plugin_of, settings_of
+from tcrctl.plugins.plugin import is_written_out, made_again, plugin_of, settings_of
+from tcrctl.task.section import TaskSection
 from tcrctl.trajectory.section import TrajectorySection
 
 Model = TypeVar("Model", bound=Settings)
@@ -36,6 +37,7 @@ BASES: Final[Mapping[str, type[Settings]]] = {
     "controller": OwnControllerSection,
     "estimator": EstimatorSection,
     "plant": PlantSection,
+    "task": TaskSection,
 }
 
 
@@ -89,10 +91,30 @@ def with_plugins(document: Document, model: type[Model], trust: Trust) -> tuple[
             problems.append(document.problem((section, "kind"), f"{error} {error.hint}".strip()))
             continue
         if found is not None:
-            fields[section] = _joined(model, section, found)
-    if fields:
-        model = create_model(model.__name__, __base__=model, __doc__=model.__doc__, **fields)
-    return model, problems
+            fields[section] = found
+    return _with(model, fields), problems
+
+
+def _with(model: type[Model], found: Mapping[str, type[Settings]]) -> type[Model]:
+    """Return the model with one more kind in some of its sections."""
+    if not found:
+        return model
+    fields: dict[str, Any] = {
+        section: _joined(model, section, settings) for section, settings in found.items()
+    }
+    made = create_model(model.__name__, __base__=model, __doc__=model.__doc__, **fields)
+    made.__reduce__ = partialmethod(_reduced, model)  # type: ignore[assignment]
+    return made
+
+
+def _reduced(spec: Settings, model: type[Settings]) -> tuple[Any, ...]:
+    """Send an experiment to another process: its class is made, so nobody finds it by its name."""
+    return _blank, (model, origins(spec)), spec.__getstate__()
+
+
+def _blank(model: type[Settings], kinds: Sequence[Origin]) -> Settings:
+    made = _with(model, {origin.section: made_again(origin) for origin in kinds})
+    return made.__new__(made)
 
 
 def validated(document: Document, model: type[Model]) -> Model:
@@ -134,7 +156,8 @@ def with_registered(model: type[Model]) -> type[Model]:
 
 def origins(spec: Settings) -> tuple[Origin, ...]:
     """Return where the kinds of an experiment come from that are not built in, in the order of its sections."""
-    found = (plugin_of(getattr(spec, section)) for section in GROUPS)
+    named = (getattr(spec, section) for section in GROUPS)
+    found = (plugin_of(settings) for settings in named if settings is not None)  # most runs have no task
     return tuple(plugin.origin for plugin in found if plugin is not None)
 
 

@@ -25,7 +25,7 @@ from tcrctl.experiment.criterion import CriterionText
 from tcrctl.experiment.plant_robot import plant_robot
 from tcrctl.experiment.plugged import trust_of, validated, with_plugins
 from tcrctl.experiment.summary import TASK, UNITS
-from tcrctl.experiment.table_file import with_table
+from tcrctl.experiment.table_file import with_samples
 from tcrctl.plant.realistic import as_drawn
 from tcrctl.plant.rig.file import LoadedRig, load_rig
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
@@ -126,8 +126,9 @@ def _disagreements(spec: ExperimentSpec) -> Iterator[Finding]:
     if spec.controller.follows_drives and not spec.trajectory.gives_drives:
         need = f"must be drives with controller.kind: {spec.controller.kind}"
         yield ("trajectory", "kind"), f"{need}, not {spec.trajectory.kind}"
-    for keys, message in spec.plant.misfits(spec.controller.period_s):
-        yield ("plant", *keys), message
+    for name, section in (("plant", spec.plant), ("trajectory", spec.trajectory)):
+        for keys, message in section.misfits(spec.controller.period_s):
+            yield (name, *keys), message
 
 
 def _target_disagreements(spec: ExperimentSpec) -> Iterator[Finding]:
@@ -237,7 +238,7 @@ def read_spec(
     spec, robot, robot_path = _validated(document, path.parent, problems, model)
     document.refuse(misfits(spec, robot))
     estimator = with_calibration(document, spec.estimator, robot)
-    trajectory = with_table(document, spec.trajectory)
+    trajectory = with_samples(document, spec.trajectory)
     spec = spec.model_copy(update={"estimator": estimator, "trajectory": trajectory})
     named = spec.plant.rig_file
     rig = None if named is None else load_rig(named, robot, path.parent)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 
 from tcrctl.errors import TcrctlError
@@ -32,9 +33,11 @@ def run_unrecorded(experiment: Experiment, check: Check = no_check) -> Summary:
 
     try:
         plant, state = build_plant(experiment)
-        parts, _ = build_parts(experiment, plant, state)
-        metrics = Metrics(parts.steps, paced=False)
-        run_loop(replace(parts, record=record, pace=Unpaced(check)))
+        with closing(plant):
+            parts, _ = build_parts(experiment, plant, state)
+            metrics = Metrics(parts.steps, paced=False)
+            plant.start()
+            run_loop(replace(parts, record=record, pace=Unpaced(check)))
     except TcrctlError as error:
         failure = error
     return summary_of(experiment, "", metrics, {} if task is None else task.result(), failure)

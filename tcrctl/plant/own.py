@@ -9,10 +9,11 @@ import numpy as np
 from tcrctl.errors import PluginStoppedError
 from tcrctl.plant.settings import PlantSection
 from tcrctl.plugins.faults import built, called, refuse_lacking
+from tcrctl.plugins.handed import handed
 from tcrctl.plugins.plugin import Plugin
 from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot
-from tcrctl.signals import Command, Measurement, Truth
+from tcrctl.signals import Array, Command, Measurement, Truth
 
 
 class OwnPlant:
@@ -31,6 +32,7 @@ class OwnPlant:
         """
         self._origin = plugin.origin
         self._markers, self._cables = len(ring_rows(robot.n_modules)), robot.n_cables
+        self._nodes = robot.rest.q.size
         self._made = built(plugin.origin, plugin.build, settings, robot, period, seed)
         refuse_lacking(plugin.origin, self._made, ("read", "write", "close"))
 
@@ -56,7 +58,7 @@ class OwnPlant:
                 raise self._refused("read", f"{name} that are no {types[name].__name__} of shape {shape}")
         if not np.isfinite(found.drive).all() or not np.isfinite(found.nodes[found.valid]).all():
             raise self._refused("read", "values that are no finite numbers")
-        return found
+        return handed(found)  # a plant may fill the same arrays again before the log has written them
 
     def write(self, command: Command) -> Command:
         """Send a command; returns what was really sent.
@@ -64,23 +66,40 @@ class OwnPlant:
         Raises:
             PluginStoppedError: If it raises, or returns something else.
         """
-        sent = called(self._origin, "write", self._made.write, command)
+        sent = called(self._origin, "write", self._made.write, handed(command))
         if not isinstance(sent, Command):
             raise self._refused("write", f"a {type(sent).__name__}, not the Command that was sent")
-        if sent.speed.shape != (self._cables,) or sent.drive.shape != (self._cables,):
-            raise self._refused("write", f"a Command of another shape than ({self._cables},)")
-        return sent
+        return Command(
+            self._vector("write", "speed", sent.speed, self._cables),
+            self._vector("write", "drive", sent.drive, self._cables),
+        )
 
     def truth(self) -> Truth | None:
         """Return what it knows about itself at the time of the last ``read``, if it knows more than it measures."""
         found = called(self._origin, "truth", self._made.truth) if hasattr(self._made, "truth") else None
         if found is not None and not isinstance(found, Truth):
             raise self._refused("truth", f"a {type(found).__name__}, not a Truth")
-        return found
+        if found is None:
+            return None
+        sizes = {"position": 3, "normal": 3, "tension": self._cables, "q": self._nodes}
+        checked = {name: self._vector("truth", name, getattr(found, name), n) for name, n in sizes.items()}
+        return Truth(**checked)
 
     def close(self) -> None:
         """Leave the robot in a safe state."""
         called(self._origin, "close", self._made.close)
+
+    def _vector(self, function: str, name: str, values: Any, size: int) -> Array:
+        """Return a copy of a vector of finite numbers."""
+        try:
+            found = np.array(values, dtype=float)
+        except (TypeError, ValueError):
+            raise self._refused(function, f"{name} that are no numbers") from None
+        if found.shape != (size,):
+            raise self._refused(function, f"{name} of shape {found.shape}, not ({size},)")
+        if not np.isfinite(found).all():
+            raise self._refused(function, f"{name} that is not finite")
+        return found
 
     def _refused(self, name: str, what: str) -> PluginStoppedError:
         return PluginStoppedError(self._origin.what, f"{name} returned {what}")

@@ -13,6 +13,7 @@ GROUPS: Final[Mapping[str, str]] = {
     "controller": "tcrctl.controllers",
     "estimator": "tcrctl.estimators",
     "plant": "tcrctl.plants",
+    "task": "tcrctl.tasks",
 }
 
 

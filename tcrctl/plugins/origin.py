@@ -12,6 +12,7 @@ class Origin:
     Attributes:
         section: Section of the experiment that names it.
         kind: Its name there.
+        name: What the module or file calls it.
         module: Module that defines it; empty for a file.
         file: The file itself, or that of the module.
         package: Distribution that brings it; empty if it is none of an installed one.
@@ -22,6 +23,7 @@ class Origin:
 
     section: str
     kind: str
+    name: str
     module: str
     file: str
     package: str

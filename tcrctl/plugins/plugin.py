@@ -23,7 +23,7 @@ from tcrctl.config.settings import Settings
 from tcrctl.errors import InputError
 from tcrctl.plugins.groups import package_of, registered
 from tcrctl.plugins.origin import Origin
-from tcrctl.plugins.source import from_file, from_module
+from tcrctl.plugins.source import again, from_file, from_module, is_file
 
 Find = Callable[[str], Path]
 Line = tuple[type[Settings], Callable[..., Any]]
@@ -66,10 +66,9 @@ def settings_of(section: str, kind: str, base: type[Settings], find: Find) -> ty
     """
     if is_written_out(kind):
         place, _, name = kind.rpartition(":")
-        is_file = place.endswith(".py") or "/" in place or "\\" in place
         line, origin = (
             from_file(section, kind, find(place), name)
-            if is_file
+            if is_file(place)
             else from_module(section, kind, place, name)
         )
     else:
@@ -109,4 +108,29 @@ def _with_kind(settings: type[Settings], build: Callable[..., Any], origin: Orig
     kind: Any = (Literal[origin.kind], ...)
     made = create_model(settings.__name__, __base__=settings, __doc__=settings.__doc__, kind=kind)
     made.plugin = Plugin(build, origin)
+    made.__reduce__ = _reduced  # type: ignore[assignment]
     return made
+
+
+def _reduced(self: Settings) -> tuple[Any, ...]:
+    """Send settings to another process: their class is made, so nobody finds it by its name."""
+    plugin = plugin_of(self)
+    assert plugin is not None
+    return _blank, (plugin.origin,), self.__getstate__()
+
+
+def _blank(origin: Origin) -> Settings:
+    made = made_again(origin)
+    return made.__new__(made)
+
+
+def made_again(origin: Origin) -> type[Settings]:
+    """Return the settings of a kind from elsewhere that another process has found.
+
+    Args:
+        origin: Where it comes from.
+
+    Raises:
+        InputError: If it cannot be loaded here.
+    """
+    return _with_kind(*_checked(origin, again(origin), Settings), origin)

@@ -11,12 +11,11 @@ from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError, SpecError
 from tcrctl.experiment.plugged import Trust, validated, with_plugins
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, misfits
-from tcrctl.experiment.table_file import kept_name
 from tcrctl.log.file_names import RESOLVED, ROBOT, SPEC
 from tcrctl.log.reader import Log
 from tcrctl.log.run_files import RunFiles
 from tcrctl.robot.description import RobotDescription
-from tcrctl.trajectory.table_settings import TableSettings
+from tcrctl.trajectory.sampled_section import SampledSection
 
 #: Sections that a replay can change: the others made what was recorded.
 CHANGEABLE: Final = ("controller", "estimator", "safety")
@@ -88,8 +87,8 @@ def _loaded(
     if problems:
         raise SpecError(problems)
     spec = validated(document, model)
-    if isinstance(spec.trajectory, TableSettings):  # asked only if the controller looks at other instants
-        content = files.content(kept_name(spec.trajectory.file))
+    if isinstance(spec.trajectory, SampledSection):  # asked only if the controller looks at other instants
+        content = files.content(spec.trajectory.kept_name)
         spec = spec.model_copy(update={"trajectory": spec.trajectory.with_content(content)})
     document.refuse(misfits(spec, robot))
     place = Path(files.place(""))

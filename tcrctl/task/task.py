@@ -10,12 +10,15 @@ import numpy as np
 from tcrctl.config.settings import Settings
 from tcrctl.log.drawing import Drawing
 from tcrctl.log.event import Event
+from tcrctl.plugins.plugin import plugin_of
 from tcrctl.signals import Array, StepRecord
 from tcrctl.task.box import hole_targets
 from tcrctl.task.box_inspection import build_box_inspection
 from tcrctl.task.drawing import box_drawing, pipe_drawing
 from tcrctl.task.laser_pipe import build_laser_pipe
+from tcrctl.task.own import OwnTask, targets_of
 from tcrctl.task.pipe import Seen, pipe_targets
+from tcrctl.task.section import TaskSection
 from tcrctl.task.settings import BoxInspectionSettings, LaserPipeSettings, TaskSettings
 from tcrctl.trajectory.pose_path import MM, EndPose
 
@@ -58,30 +61,41 @@ KINDS: Final[Mapping[str, Kind]] = {
 }
 
 
-def task_targets(settings: TaskSettings, seed: int) -> Mapping[str, EndPose]:
+def task_targets(settings: TaskSettings | TaskSection, seed: int) -> Mapping[str, EndPose]:
     """Compute the named poses that the trajectory may go to, from the markers as the cameras see them.
 
     Args:
         settings: The task.
         seed: Seed of the marker noise.
     """
+    if isinstance(settings, TaskSection):
+        return targets_of(settings)
     kind = KINDS[settings.kind]
     return kind.targets(settings, _noisy(MM * 1e-3 * settings.marker_noise_um, seed))
 
 
-def task_drawing(settings: TaskSettings | None) -> Drawing:
+def task_drawing(settings: TaskSettings | TaskSection | None) -> Drawing:
     """Return what pictures show of a task; of none, nothing."""
-    return Drawing() if settings is None else KINDS[settings.kind].drawing(settings)
+    if settings is None or isinstance(settings, TaskSection):
+        return Drawing()
+    return KINDS[settings.kind].drawing(settings)
 
 
-def build_task(settings: TaskSettings, seed: int, rod_diameter: float) -> Task:
+def build_task(settings: TaskSettings | TaskSection, seed: int, rod_diameter: float) -> Task:
     """Build a task; it judges by where things really are.
 
     Args:
         settings: The task.
         seed: Seed of the marker noise.
         rod_diameter: Diameter of the robot's rods and rings [m].
+
+    Raises:
+        InputError: If one from elsewhere cannot be built.
     """
+    if isinstance(settings, TaskSection):
+        plugin = plugin_of(settings)
+        assert plugin is not None  # nothing else makes one
+        return OwnTask(settings, plugin, task_targets(settings, seed), rod_diameter)
     return KINDS[settings.kind].build(settings, task_targets(settings, seed), rod_diameter)
 
 

@@ -47,15 +47,15 @@ class DrivesTrajectory:
     def drive(self, t: Array) -> Array:
         """Return drive lengths at times t (n,) [s] as (n, m) [m]; clamped beyond the ends."""
         legs = np.arange(self.corners.shape[0], dtype=float)
-        return _interpolated(self.time_law.arc_length(t), legs, self.corners)
+        return interpolated(self.time_law.arc_length(t), legs, self.corners)
 
     def position(self, t: Array) -> Array:
         """Return end positions at times t (n,) [s] as (n, 3) [m]."""
-        return _interpolated(self.time_law.arc_length(t), self.s, self.positions)
+        return interpolated(self.time_law.arc_length(t), self.s, self.positions)
 
     def normal(self, t: Array) -> Array:
         """Return unit end normals at times t (n,) [s] as (n, 3)."""
-        between = _interpolated(self.time_law.arc_length(t), self.s, self.normals)
+        between = interpolated(self.time_law.arc_length(t), self.s, self.normals)
         normal: Array = between / np.linalg.norm(between, axis=1, keepdims=True)
         return normal
 
@@ -108,7 +108,7 @@ def end_poses(corners: Array, s: Array, robot: Robot) -> tuple[Array, Array]:
         s: Leg parameters in order (k,), beginning at 0.
         robot: The robot.
     """
-    drives = _interpolated(s, np.arange(corners.shape[0], dtype=float), corners)
+    drives = interpolated(s, np.arange(corners.shape[0], dtype=float), corners)
     positions, normals = np.empty((s.size, 3)), np.empty((s.size, 3))
     q, before = robot.rest.q, np.zeros(robot.n_cables)
     for i, drive in enumerate(drives):
@@ -117,6 +117,6 @@ def end_poses(corners: Array, s: Array, robot: Robot) -> tuple[Array, Array]:
     return positions, normals
 
 
-def _interpolated(s: Array, at: Array, values: Array) -> Array:
+def interpolated(s: Array, at: Array, values: Array) -> Array:
     """Return the linear interpolation of every column of values (k, c) given at (k,); (n, c) at s (n,)."""
     return np.stack([np.interp(s, at, column) for column in values.T], axis=1)

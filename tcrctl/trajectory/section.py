@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import ClassVar, NamedTuple, Self
 
-from tcrctl.config.keys import Keys
+from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.settings import Settings
 from tcrctl.trajectory.values import Vector
 
@@ -39,4 +39,9 @@ class TrajectorySection(Settings):
 
     def drives_named(self) -> Iterator[tuple[Keys, tuple[float, ...]]]:
         """Yield place in the section and drive lengths [mm] wherever it gives some."""
+        yield from ()
+
+    def misfits(self, period: float) -> Iterator[Finding]:
+        """Yield place and message of what does not go with a control period [s]."""
+        del period
         yield from ()

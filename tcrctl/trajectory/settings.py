@@ -10,10 +10,12 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from tcrctl.config.settings import Settings, quantity
 from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.excitation_settings import ExcitationSettings
+from tcrctl.trajectory.function_settings import FunctionSettings
 from tcrctl.trajectory.pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
 from tcrctl.trajectory.section import TrajectorySection
 from tcrctl.trajectory.table_settings import TableSettings
 from tcrctl.trajectory.values import NotNegative, Positive, Vector, check_one_of, not_empty
+from tcrctl.trajectory.wave_settings import ChirpSettings, SineSettings, StepsSettings
 
 JOIN_TOLERANCE_MM = 1e-6
 AXIS_TOLERANCE = 1e-3  # axes typed with four decimals pass; the builder makes them exactly orthonormal
@@ -177,7 +179,11 @@ TrajectorySettings: TypeAlias = Annotated[
     | ScanSettings
     | DrivesSettings
     | ExcitationSettings
-    | TableSettings,
+    | TableSettings
+    | FunctionSettings
+    | SineSettings
+    | ChirpSettings
+    | StepsSettings,
     Field(discriminator="kind"),
 ]
 """Union of all kinds of trajectory, told apart by ``kind``; see :data:`tcrctl.trajectory.trajectory.KINDS`."""

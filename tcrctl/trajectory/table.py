@@ -1,4 +1,4 @@
-"""``kind: table``: an end pose given by samples, interpolated by cubic splines from rest to rest.
+"""``kind: table`` and ``function``: an end pose given by samples, interpolated by cubic splines from rest to rest.
 
 The splines are twice continuously differentiable; at both ends their speed is zero, because a run begins and
 ends at rest. What speed and acceleration they need is held against limits before anything moves.
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,9 @@ import numpy as np
 from tcrctl.errors import InfeasibleError, InputError
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
-from tcrctl.trajectory.samples import Samples, samples_of
+from tcrctl.trajectory.sampled_section import SampledSection
+from tcrctl.trajectory.samples import Columns, Samples, samples_of
 from tcrctl.trajectory.table_files import columns_of
-from tcrctl.trajectory.table_settings import TableSettings
 
 MM = 1e-3  # [m]
 #: Instants between two samples at which speed and acceleration are looked at.
@@ -61,7 +62,7 @@ class TableTrajectory:
         return np.clip(t - self.lead_in, 0.0, self.last)
 
 
-def table_samples(settings: TableSettings) -> Samples:
+def table_samples(settings: SampledSection) -> Samples:
     """Return the samples of a section whose file has been read.
 
     Raises:
@@ -69,17 +70,22 @@ def table_samples(settings: TableSettings) -> Samples:
         InputError: If the file has not been read, or is of another kind.
     """
     if not settings.content:
-        raise InputError(f"trajectory.file: {settings.file}: is empty, or not at hand")
-    return _read(settings.content, settings.file, settings.largest_gap, MM * settings.speed_limit_mm_s)
+        raise InputError(f"samples of {settings.called}: are empty, or not at hand")
+    names = (settings.kept_name, settings.called)
+    return _read(settings.content, names, settings.gap_limit, MM * settings.speed_limit_mm_s)
 
 
 @lru_cache(maxsize=1)
-def _read(content: bytes, file: str, largest_gap: float, speed_limit: float) -> Samples:
-    """Read a table once, though its section is checked before it is built."""
-    return samples_of(columns_of(content, file), largest_gap, speed_limit)
+def _read(content: bytes, names: tuple[str, str], largest_gap: float, speed_limit: float) -> Samples:
+    """Read samples once, though their section is checked before it is built; names: of the file, in messages."""
+    kept, called = names
+    if Path(called).suffix.lower() == Path(kept).suffix:
+        return samples_of(columns_of(content, called), largest_gap, speed_limit)
+    found = columns_of(content, kept)  # of a function: nobody has written its lines
+    return samples_of(Columns(called, found.values), largest_gap, speed_limit)
 
 
-def build_table(settings: TableSettings, robot: Robot) -> TableTrajectory:
+def build_table(settings: SampledSection, robot: Robot) -> TableTrajectory:
     """Interpolate the samples.
 
     Args:
@@ -104,7 +110,7 @@ def build_table(settings: TableSettings, robot: Robot) -> TableTrajectory:
     )
 
 
-def _check(t: Array, path: Spline, settings: TableSettings) -> None:
+def _check(t: Array, path: Spline, settings: SampledSection) -> None:
     """Raise the largest speed or acceleration that is beyond its limit."""
     looks = np.concatenate([t[:-1] + (i / LOOKS) * np.diff(t) for i in range(LOOKS)] + [t[-1:]])
     limits = (
@@ -118,5 +124,5 @@ def _check(t: Array, path: Spline, settings: TableSettings) -> None:
             key = f"trajectory.{name}_limit_{unit.replace('/', '_')}"
             hint = f"Smooth the samples, stretch their time, or raise {key}."
             raise InfeasibleError(
-                float(looks[worst]), f"{name} of {settings.file}", size[worst], limit, unit, hint=hint
+                float(looks[worst]), f"{name} of {settings.called}", size[worst], limit, unit, hint=hint
             )

@@ -14,6 +14,7 @@ from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.drives import build_drives
 from tcrctl.trajectory.excitation import build_excitation
 from tcrctl.trajectory.excitation_settings import ExcitationSettings
+from tcrctl.trajectory.function_settings import FunctionSettings
 from tcrctl.trajectory.hold import build_hold
 from tcrctl.trajectory.own import OwnTrajectory
 from tcrctl.trajectory.pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
@@ -21,10 +22,13 @@ from tcrctl.trajectory.revolution import build_revolution
 from tcrctl.trajectory.scan import build_scan
 from tcrctl.trajectory.section import TrajectorySection
 from tcrctl.trajectory.settings import HoldSettings, StrokesSettings, TrajectorySettings
+from tcrctl.trajectory.steps import build_steps
 from tcrctl.trajectory.strokes import build_strokes
 from tcrctl.trajectory.table import build_table
 from tcrctl.trajectory.table_settings import TableSettings
 from tcrctl.trajectory.targets import Targets, with_targets
+from tcrctl.trajectory.wave import build_wave
+from tcrctl.trajectory.wave_settings import ChirpSettings, SineSettings, StepsSettings
 from tcrctl.trajectory.waypoints import build_waypoints
 
 
@@ -64,6 +68,10 @@ KINDS: Final[Mapping[str, tuple[type[TrajectorySection], Callable[[Any, Robot], 
     "drives": (DrivesSettings, build_drives),
     "excitation": (ExcitationSettings, build_excitation),
     "table": (TableSettings, build_table),
+    "function": (FunctionSettings, build_table),
+    "sine": (SineSettings, build_wave),
+    "chirp": (ChirpSettings, build_wave),
+    "steps": (StepsSettings, build_steps),
 }
 
 NO_TARGETS: Targets = {}

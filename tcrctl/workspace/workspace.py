@@ -129,10 +129,17 @@ def explore(
                 raise TcrctlError(f"a ray could not be followed: {ray.reason}")
             rays[number] = ray
             told(len(rays), count)
-    return _joined(robot.name, cables, [rays[i] for i in range(count)])
+    return joined(robot.name, cables, [rays[i] for i in range(count)])
 
 
-def _joined(name: str, cables: tuple[str, ...], rays: list[Ray]) -> Workspace:
+def joined(name: str, cables: tuple[str, ...], rays: list[Ray]) -> Workspace:
+    """Return what rays from one rest, at least one, have found together.
+
+    Args:
+        name: Of the robot.
+        cables: Names of its cables.
+        rays: What lies on each.
+    """
     normal = np.concatenate([ray.normal for ray in rays])
     return Workspace(
         robot=name,

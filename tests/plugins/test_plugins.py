@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import pickle
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from textwrap import dedent
 
@@ -254,3 +257,18 @@ def test_the_name_of_a_built_in_kind_stays_its_own(own, package, capsys):
     assert main(["kinds"]) == 0
     assert "cannot be used: a built-in kind has this name" in capsys.readouterr().out
     assert load_spec(own(experiment=EXPERIMENT.replace("./own.py:OWN", "ioc"))).spec.controller.plugin is None
+
+
+def test_an_experiment_with_kinds_of_a_file_is_itself_in_another_process_whatever_becomes_of_the_file(
+    own, tmp_path
+):
+    loaded = load_spec(own(), ("controller.gain_1_s=3",))
+    sent = pickle.dumps(loaded)
+    (tmp_path / "own.py").write_text("1 / 0")
+    program = (
+        "import pickle, sys; loaded = pickle.load(sys.stdin.buffer); c = loaded.spec.controller; "
+        "print(c.gain_1_s, c.plugin.build.__name__, loaded.spec.model_dump_json())"
+    )
+    done = subprocess.run([sys.executable, "-c", program], input=sent, capture_output=True, check=True)
+    assert done.stdout.decode().split(" ", 2) == ["3.0", "Own", loaded.spec.model_dump_json() + "\n"]
+    assert pickle.loads(sent).spec.controller == loaded.spec.controller
