@@ -167,6 +167,22 @@ class SafetyLimitError(StoppedError):
         self.unit = unit
 
 
+class PictureError(StoppedError):
+    """Too little of what the cameras show can be believed; the drives were held.
+
+    Attributes:
+        doubts: What is not believed, and why.
+    """
+
+    def __init__(self, step: int, doubts: str) -> None:
+        super().__init__(
+            f"safety stop at step {step}: the cameras' picture is not believed: {doubts}",
+            step,
+            hint="tcrctl rig check; limits are in safety.picture, see docs/bench.md.",
+        )
+        self.doubts = doubts
+
+
 class TimeLimitError(StoppedError):
     """A run took longer than it may.
 

@@ -1,0 +1,107 @@
+"""What of a robot's shape does not change with its pose: sizes of rings, and how each joint holds the next ring.
+
+A module is rigid: its markers say where its apex is. The next ring hangs on that apex by springs, a few millimetres
+at most from where it hung at the start, however the robot bends. So
+
+    side    distance between two markers of a ring
+    offset  apex of the ring above, in the axes of the ring: x and y sideways, z along the body
+    twist   angle of the ring about its normal against the ring above
+    bend    normal of the ring above, in the axes of the ring, x and y
+
+Sides and offsets change little on a healthy robot; twist a little more; bends are what the robot moves with.
+The fixed base is the first ring. What markers do not show is NaN.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcrctl.robot.module import RING, apexes, rings
+from tcrctl.robot.ring_axes import ring_frames
+from tcrctl.robot.robot import Robot
+from tcrctl.signals import Array
+
+
+class Shape(NamedTuple):
+    """See the module's docstring; n free rings, the joint above each.
+
+    Attributes:
+        side: From every marker of a ring to the next one of it (n, 3) [m].
+        offset: (n, 3) [m].
+        twist: (n,) [rad].
+        bend: (n, 2), sines of angles.
+    """
+
+    side: Array
+    offset: Array
+    twist: Array
+    bend: Array
+
+    def since(self, start: Shape) -> Shape:
+        """Return the change since another shape; twists by the shorter way."""
+        twist = np.mod(self.twist - start.twist + np.pi, 2.0 * np.pi) - np.pi
+        return Shape(self.side - start.side, self.offset - start.offset, twist, self.bend - start.bend)
+
+
+class Anatomy(NamedTuple):
+    """What the markers of a robot do not show.
+
+    Attributes:
+        base: Ring nodes of the base (3, 3) [m].
+        apex: Apex of every module but the last in the axes of its ring, base first (n, 3) [m].
+    """
+
+    base: Array
+    apex: Array
+
+
+def anatomy_of(robot: Robot) -> Anatomy:
+    """Return the anatomy of a robot at rest."""
+    nodes = robot.rest.q.reshape(-1, 3)
+    corners = rings(nodes)
+    arm = apexes(nodes) - corners.mean(axis=1)
+    apex = np.einsum("nij,nj->ni", ring_frames(corners.reshape(-1, 3)), arm)
+    return Anatomy(corners[0].copy(), apex[:-1])
+
+
+def shape_of(anatomy: Anatomy, markers: Array, seen: NDArray[np.bool_]) -> Shape:
+    """Return the shape that markers show.
+
+    Args:
+        anatomy: What they do not show.
+        markers: All ring nodes (3 n, 3) [m].
+        seen: Which of them count (3 n,).
+    """
+    free = np.where(seen[:, None], markers, np.nan).reshape(-1, RING, 3)
+    side = np.linalg.norm(free - free[:, [1, 2, 0]], axis=2)
+    corners = np.concatenate([anatomy.base[None], free])
+    with np.errstate(invalid="ignore", divide="ignore"):  # three markers in one place have no normal
+        axes = ring_frames(corners.reshape(-1, 3))
+    centre = corners.mean(axis=1)
+    apex = centre[:-1] + np.einsum("ni,nij->nj", anatomy.apex, axes[:-1])
+    above, own = axes[:-1], axes[1:]
+    offset = np.einsum("nij,nj->ni", own, apex - centre[1:])
+    x_axis = np.einsum("nij,nj->ni", own, above[:, 0])
+    bend = np.einsum("nij,nj->ni", own, above[:, 2])[:, :2]
+    return Shape(side, offset, np.arctan2(x_axis[:, 1], x_axis[:, 0]), bend)
+
+
+def mean_shape(shapes: list[Shape]) -> Shape:
+    """Return the mean of shapes of a robot that stands still; NaN for what none of them shows.
+
+    Twists are averaged as differences to the first that shows them.
+    """
+    first = shapes[0]
+    for shape in shapes[1:]:
+        first = Shape(*(np.where(np.isnan(a), b, a) for a, b in zip(first, shape, strict=True)))
+    changes = [shape.since(first) for shape in shapes]
+    return Shape(*(a + _mean([c[i] for c in changes]) for i, a in enumerate(first)))
+
+
+def _mean(changes: list[Array]) -> Array:
+    stacked = np.array(changes)
+    known = ~np.isnan(stacked)
+    return np.asarray(np.where(known, stacked, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
