@@ -3,9 +3,10 @@
     frame -> sides of rings -> joints between rings -> frame without what is not believed -> estimator
                                      too little left -> hold the drives -> stop
 
-It is what an estimator's innovation says, taken where a robot is stiff. Node by node it says little: on healthy robots
-with friction and late frames a node is up to 57 mm from where the estimate expects it (one in a hundred 20 mm), and
-its own springs let the estimate follow a marker that drifts. Against the ring above it is 1.3 mm.
+It is what an estimator's innovation says, taken where a robot is stiff. Node by node that says little: on healthy
+robots with friction and late frames a node is up to 57 mm from where the estimate expects it (one in a hundred
+20 mm), and the virtual springs let the estimate follow a marker that drifts. Against the ring above a ring moves by
+1 or 2 mm.
 
 What is left out is not valid in the measurement that is recorded, so that a replay needs no judgement.
 """
@@ -88,7 +89,7 @@ class PictureJudge:
         self._out, self._frame_out = verdict.out, verdict.frame
         left = int(np.count_nonzero(seen & ~verdict.out))
         needed = self._settings.least_share * np.count_nonzero(seen)
-        self._doubt(verdict, few=verdict.frame or left < needed)
+        self._doubt(verdict, few=verdict.frame or bool(left < needed))
         if not verdict.out.any():
             return measured
         return replace(measured, valid=seen & ~verdict.out)

@@ -1,10 +1,10 @@
 """How much a joint may have changed: shares of their limits, sideways, along the body and in twist.
 
-Cables pull across a joint that bends: sideways its ring moves by about 3.5 mm per sine of the angle. Along the body all
-joints give way together as cables are pulled, each by its own stiffness; what counts is the difference to the joints
-beside it. Measured on simulated plants with everything of docs/reality.md, largest size: sideways rings are up to
-1.2 mm and 0.03 mm per degree beside that, along the body up to 1.2 mm and half of what the joints beside it have moved.
-Noise of markers beyond the usual 50 um comes on top.
+Cables pull across a joint that bends: sideways its ring moves by about 3.5 mm per sine of the angle. Along the body
+all joints give way together as cables are pulled, each by its own stiffness; what counts is the difference to the
+joints beside it. Measured on simulated plants with everything of docs/reality.md, largest size: sideways rings are
+up to 1.2 mm and 0.03 mm per degree beside that, along the body up to 1.2 mm and half of what the joints beside it
+have moved. Noise of markers beyond the usual 50 um comes on top.
 """
 
 from __future__ import annotations
@@ -133,8 +133,8 @@ def joint_shares(change: Shape, limits: Limits, noise: float) -> Shares:
 def _beside(z: Array) -> tuple[Array, Array]:
     """Return what joints beside each say that it has moved along the body, and the largest that they have (n,) [m].
 
-    Between two joints their mean, at an end the line through the next two; NaN where one of these is not known: where
-    cables end, one joint alone says little of the next.
+    Between two joints their mean, at an end the line through the next two; NaN where one of these is not known:
+    where cables end, one joint alone says little of the next.
     """
     n, nan = z.size, np.full(1, np.nan)
     before, after = np.concatenate([nan, z[:-1]]), np.concatenate([z[1:], nan])

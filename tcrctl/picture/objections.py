@@ -1,7 +1,7 @@
 """The picture judged before the drives are armed: against the model's shape at the drives that were read.
 
-    frames at rest -> mean -> sides of rings -> joints between rings -> rings where the model has them
-                                            -> model laid over the picture: mirrored, turned, tilted
+frames at rest -> mean -> sides of rings -> joints between rings -> rings where the model has them
+                                        -> model laid over the picture: mirrored, turned, tilted
 """
 
 from __future__ import annotations
@@ -61,14 +61,14 @@ def objections(settings: PictureSettings, robot: Robot, frames: Sequence[Measure
     over = laid_over(picture.model[picture.seen], picture.markers[picture.seen])
     if _is_mirrored(picture, over):
         return ["the frame of the cameras is mirrored: an axis has the wrong sign"]
-    verdict = _suspects(settings, picture, anatomy)
+    verdict, sized = _suspects(settings, picture, anatomy)
     believed = picture.seen & ~verdict.out
     if not verdict.frame and np.count_nonzero(believed) >= 2 * RING:
         over = laid_over(picture.model[believed], picture.markers[believed])
     wrong = {suspect.ring for suspect in verdict.suspects}
     return [
         *_frame(settings, over),
-        *(_hints(picture, over) if wrong else ()),
+        *(_hints(picture, over, sized) if wrong else ()),
         *_told(verdict),
         *_places(settings, picture, over, wrong),
     ]
@@ -104,7 +104,10 @@ def _is_mirrored(picture: Picture, over: LaidOver) -> bool:
     return mirror.mirrored and over.rms > BETTER * mirror.rms
 
 
-def _suspects(settings: PictureSettings, picture: Picture, anatomy: Anatomy) -> Verdict:
+def _suspects(
+    settings: PictureSettings, picture: Picture, anatomy: Anatomy
+) -> tuple[Verdict, NDArray[np.bool_]]:
+    """Return what is not believed, and which markers are seen in rings of the right size (3 n,)."""
     limits = limits_before_arming(settings)
     model = shape_of(anatomy, picture.model, np.ones_like(picture.seen))
     verdict = Verdict(np.zeros_like(picture.seen))
@@ -115,16 +118,17 @@ def _suspects(settings: PictureSettings, picture: Picture, anatomy: Anatomy) -> 
 
     change = shape_of(anatomy, picture.markers, picture.seen).since(model)
     wrong_markers(verdict, side_shares(change, limits, 0.0))
+    sized = picture.seen & ~verdict.out
     wrong_rings(verdict, look)
-    return verdict
+    return verdict, sized
 
 
-def _hints(picture: Picture, over: LaidOver) -> Iterator[str]:
+def _hints(picture: Picture, over: LaidOver, sized: NDArray[np.bool_]) -> Iterator[str]:
     """Yield rings that look like others, or like themselves with labels that have moved on."""
     n = picture.seen.size // RING
     model = (picture.model @ over.rotation.T + over.translation).reshape(n, RING, 3)
     seen = picture.markers.reshape(n, RING, 3)
-    for ring in np.flatnonzero(picture.seen.reshape(n, RING).all(axis=1)).tolist():
+    for ring in np.flatnonzero(sized.reshape(n, RING).all(axis=1)).tolist():
         away = np.linalg.norm(model.mean(axis=1) - seen[ring].mean(axis=0), axis=1)
         nearest = int(np.argmin(away))
         if nearest != ring:
@@ -133,9 +137,7 @@ def _hints(picture: Picture, over: LaidOver) -> Iterator[str]:
             yield f"the labels of ring {ring + 1} are turned by {np.degrees(turn):.0f} deg"
 
 
-def _places(
-    settings: PictureSettings, picture: Picture, over: LaidOver, wrong: set[int]
-) -> Iterator[str]:
+def _places(settings: PictureSettings, picture: Picture, over: LaidOver, wrong: set[int]) -> Iterator[str]:
     """Yield rings that are far from the model laid over the picture, and not told of yet."""
     model = picture.model @ over.rotation.T + over.translation
     away = np.where(picture.seen, np.linalg.norm(picture.markers - model, axis=1), 0.0).reshape(-1, RING)
@@ -148,6 +150,9 @@ def _places(
 def _frame(settings: PictureSettings, over: LaidOver) -> Iterator[str]:
     """Yield how the whole picture is turned against the model."""
     limit = settings.start_frame_deg
-    for what, angle in (("tilted", np.degrees(over.tilt)), ("turned about the vertical", np.degrees(over.turn))):
+    for what, angle in (
+        ("tilted", np.degrees(over.tilt)),
+        ("turned about the vertical", np.degrees(over.turn)),
+    ):
         if abs(angle) > limit:
             yield f"the frame of the cameras is {what} by {abs(angle):.0f} deg (limit {limit:g} deg)"

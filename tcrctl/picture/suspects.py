@@ -2,8 +2,8 @@
 
 A marker that has moved changes the two sides that meet in it. A ring that has moved, or is tilted by one of its
 markers, changes the joints above and below; a frame that has moved changes the first joint only, because the base
-does not move with it. So whatever explains the worst change and most of those beside it is left out, and what is left is
-looked at again.
+does not move with it. So whatever explains the worst change and most of those beside it is left out, and what is
+left is looked at again.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from tcrctl.signals import Array
 
 #: What a joint that nobody sees has changed by, as a share of the one beside it that has changed most.
 UNSEEN: Final = 0.6
-#: One marker has come loose if the two sides that meet in it have changed, one by at least this share of the other ...
+#: One marker has come loose if both sides that meet in it have changed, one by at least this share of the other ...
 BOTH: Final = 0.4
-#: ... and the third side by no more than this share of them.
+#: ... and the third one by no more than this share of them.
 ALONE: Final = 0.5
 #: The first ring, not the frame, explains a change of the first joint if the second one's is this share of it.
 NOT_THE_FRAME: Final = 0.7
