@@ -24,7 +24,7 @@ from tcrctl.errors import PictureError
 from tcrctl.picture.limits import Shares, joint_shares, limits_in_motion, side_shares
 from tcrctl.picture.notes import PictureNotes
 from tcrctl.picture.settings import PictureSettings
-from tcrctl.picture.shape import Shape, anatomy_of, mean_shape, shape_of
+from tcrctl.picture.shape import Shape, anatomy_of, median_shape, shape_of
 from tcrctl.picture.suspects import Verdict, wrong_markers, wrong_rings
 from tcrctl.robot.module import RING
 from tcrctl.robot.robot import Robot
@@ -77,7 +77,7 @@ class PictureJudge:
         for measured in start:
             shapes.append(shape_of(self._anatomy, measured.nodes.astype(float), measured.valid))
             self._listen(measured.t, shapes[-1].side)
-        self._start = mean_shape(shapes)
+        self._start = median_shape(shapes)
         self._blend = -float(np.expm1(-period / FILTER))
 
     def judged(self, measured: Measurement) -> Measurement:

@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.robot.module import RING, apexes, rings
+from tcrctl.picture.kernel import measure
+from tcrctl.robot.module import apexes, rings
 from tcrctl.robot.ring_axes import ring_frames
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
@@ -75,33 +76,22 @@ def shape_of(anatomy: Anatomy, markers: Array, seen: NDArray[np.bool_]) -> Shape
         markers: All ring nodes (3 n, 3) [m].
         seen: Which of them count (3 n,).
     """
-    free = np.where(seen[:, None], markers, np.nan).reshape(-1, RING, 3)
-    side = np.linalg.norm(free - free[:, [1, 2, 0]], axis=2)
-    corners = np.concatenate([anatomy.base[None], free])
-    with np.errstate(invalid="ignore", divide="ignore"):  # three markers in one place have no normal
-        axes = ring_frames(corners.reshape(-1, 3))
-    centre = corners.mean(axis=1)
-    apex = centre[:-1] + np.einsum("ni,nij->nj", anatomy.apex, axes[:-1])
-    above, own = axes[:-1], axes[1:]
-    offset = np.einsum("nij,nj->ni", own, apex - centre[1:])
-    x_axis = np.einsum("nij,nj->ni", own, above[:, 0])
-    bend = np.einsum("nij,nj->ni", own, above[:, 2])[:, :2]
-    return Shape(side, offset, np.arctan2(x_axis[:, 1], x_axis[:, 0]), bend)
+    return Shape(*measure(anatomy.base, anatomy.apex, markers, seen))
 
 
-def mean_shape(shapes: list[Shape]) -> Shape:
-    """Return the mean of shapes of a robot that stands still; NaN for what none of them shows.
+def median_shape(shapes: list[Shape]) -> Shape:
+    """Return the median of shapes of a robot that stands still; NaN for what none of them shows.
 
-    Twists are averaged as differences to the first that shows them.
+    Twists are taken as differences to the first that shows them.
     """
     first = shapes[0]
     for shape in shapes[1:]:
         first = Shape(*(np.where(np.isnan(a), b, a) for a, b in zip(first, shape, strict=True)))
     changes = [shape.since(first) for shape in shapes]
-    return Shape(*(a + _mean([c[i] for c in changes]) for i, a in enumerate(first)))
+    return Shape(*(a + _median([c[i] for c in changes]) for i, a in enumerate(first)))
 
 
-def _mean(changes: list[Array]) -> Array:
+def _median(changes: list[Array]) -> Array:
     stacked = np.array(changes)
-    known = ~np.isnan(stacked)
-    return np.asarray(np.where(known, stacked, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+    nobody = np.isnan(stacked).all(axis=0)
+    return np.asarray(np.nanmedian(np.where(nobody, 0.0, stacked), axis=0))
