@@ -22,6 +22,8 @@ PULL: Final = -3.5e-3
 PER_BEND: Final = 0.03e-3 * 180.0 / np.pi
 #: Difference along the body as a share of what the joints beside it have moved.
 ALONG: Final = 0.5
+#: Largest change along the body that a joint can have [m].
+GIVE: Final = 0.01
 #: Noise of markers that the limits allow for [m].
 USUAL: Final = 50e-6
 #: Standard deviations that more noise may reach, and what of a marker's noise arrives in an offset and a side.
@@ -134,9 +136,10 @@ def _beside(z: Array) -> tuple[Array, Array]:
     """Return what joints beside each say that it has moved along the body, and the largest that they have (n,) [m].
 
     Between two joints their mean, at an end the line through the next two; NaN where one of these is not known:
-    where cables end, one joint alone says little of the next.
+    where cables end, one joint alone says little of the next. A joint that has moved by more than it can says no more.
     """
     n, nan = z.size, np.full(1, np.nan)
+    z = np.clip(z, -GIVE, GIVE)
     before, after = np.concatenate([nan, z[:-1]]), np.concatenate([z[1:], nan])
     expected = 0.5 * (before + after)
     if n > 2:

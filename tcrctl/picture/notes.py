@@ -1,11 +1,11 @@
-"""What is not believed is told once, not in every frame, and told again when it has been well for a while."""
+"""What is not believed is told once by ring, not in every frame; again only after it has been well for a while."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from tcrctl.picture.suspects import Suspect
+from tcrctl.picture.suspects import Suspect, ring_name
 
 #: What has been well for so long is believed again [s].
 WELL: Final = 1.0
@@ -19,24 +19,24 @@ class PictureNotes:
     def __init__(self, report: Callable[[str, str, str], None], period: float) -> None:
         """Take where events go (kind, level, text) and the control period [s]."""
         self._report, self._period = report, period
-        self._well: dict[str, float] = {}
+        self._well: dict[int, float] = {}
         self._held = False
 
     def note(self, suspects: Sequence[Suspect], *, held: bool) -> str:
         """Take the suspects of one frame, and whether the drives are held for them; returns why, or nothing."""
-        names = {suspect.name for suspect in suspects}
+        rings = {suspect.ring for suspect in suspects}
         for suspect in suspects:
-            if suspect.name not in self._well:
+            if suspect.ring not in self._well:
                 self._report("picture", "warning", f"{suspect.name} is not believed: {suspect.why}")
-            self._well[suspect.name] = 0.0
-        for name in [name for name in self._well if name not in names]:
-            self._well[name] += self._period
-            if self._well[name] > WELL:
-                del self._well[name]
-                self._report("picture", "info", f"{name} is believed again")
+            self._well[suspect.ring] = 0.0
+        for ring in [ring for ring in self._well if ring not in rings]:
+            self._well[ring] += self._period
+            if self._well[ring] > WELL:
+                del self._well[ring]
+                self._report("picture", "info", f"{ring_name(ring)} is believed again")
         why = _why(suspects) if held else ""
         if held != self._held:
-            text = f"the drives are held: {why}" if held else "the picture is believed again"
+            text = f"the drives are held: {why}" if held else "the drives are not held any more"
             self._report("picture", "warning" if held else "info", text)
         self._held = held
         return why

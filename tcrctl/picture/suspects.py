@@ -25,8 +25,10 @@ UNSEEN: Final = 0.6
 BOTH: Final = 0.4
 #: ... and the third one by no more than this share of them.
 ALONE: Final = 0.5
-#: The first ring, not the frame, explains a change of the first joint if the second one's is this share of it.
+#: The first ring, not the frame, explains a change of the first joint if the second one's is this share of it; or a
+#: smaller one, if it is beyond its limit, too.
 NOT_THE_FRAME: Final = 0.7
+NOR_ELSEWHERE: Final = 0.25
 #: The frame of the cameras among the rings: that of the base.
 FRAME: Final = 0
 
@@ -103,8 +105,8 @@ def wrong_rings(verdict: Verdict, look: Callable[[NDArray[np.bool_]], Shares]) -
         if worst[joint] <= 1.0:
             return
         ring = _culprit(worst, joint)
-        why = f"{_ring(joint + 1)} {_changed(shares, joint)} against {_ring(joint)}"
-        verdict.suspects.append(Suspect(_ring(ring), why, ring))
+        why = f"{ring_name(joint + 1)} {_changed(shares, joint)} against {ring_name(joint)}"
+        verdict.suspects.append(Suspect(ring_name(ring), why, ring))
         if ring == FRAME:
             verdict.frame, verdict.out[:] = True, True
             return
@@ -115,7 +117,8 @@ def _culprit(worst: Array, joint: int) -> int:
     """Return which ring explains the worst change: the one whose other joint has changed more."""
     if joint == 0:
         second = float(worst[1]) if worst.size > 1 else 0.0
-        return 1 if second > min(1.0, NOT_THE_FRAME * worst[0]) else FRAME
+        needed = max(min(1.0, NOT_THE_FRAME * worst[0]), NOR_ELSEWHERE * worst[0])
+        return 1 if second > needed else FRAME
     above, below = (_share(worst, j, UNSEEN * float(worst[joint])) for j in (joint - 1, joint + 1))
     return joint if above > below else joint + 1
 
@@ -124,7 +127,8 @@ def _share(worst: Array, joint: int, unseen: float) -> float:
     return float(worst[joint]) if 0 <= joint < worst.size and worst[joint] > 0.0 else unseen
 
 
-def _ring(number: int) -> str:
+def ring_name(number: int) -> str:
+    """Return what a ring is called, FRAME among them."""
     return f"ring {number}" if number else "the frame of the cameras"
 
 
