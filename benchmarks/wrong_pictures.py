@@ -1,4 +1,4 @@
-"""What a run on the emulated bench makes of wrong pictures of the cameras, and how far the robot is from its path then.
+"""What a run on the emulated bench makes of wrong pictures of the cameras, and how far off its path the robot is.
 
     python benchmarks/wrong_pictures.py                # about ten minutes
     python benchmarks/wrong_pictures.py drift swapped  # only rows whose name contains one of these
@@ -38,7 +38,8 @@ def main(wanted: list[str]) -> int:
             mark = f" **{'; '.join(wrong)}**" if wrong else ""
             print(
                 f"| {row.name} | {row.allowed} | {outcome.exit_code} | {outcome.ends}{mark} "
-                f"| {outcome.error_mm:.1f} mm | {outcome.largest_mm:.1f} mm | {outcome.noticed} | {outcome.said[:100]} |",
+                f"| {outcome.error_mm:.1f} mm | {outcome.largest_mm:.1f} mm | {outcome.noticed} "
+                f"| {outcome.said[:100]} |",
                 flush=True,
             )
     print(f"\n{bad} not as they must be")

@@ -41,8 +41,35 @@ Equation numbers refer to the paper, key [TCR] in REFERENCES.md.
 
 from __future__ import annotations
 
+import importlib
+
 from tcrctl.caches.hook import watch_imports
 
 __version__ = "0.1.0"
 
+#: The program from Python, and where it is; loaded when it is used, because that takes a second. ``__init__.pyi``
+#: tells type checkers the same.
+_API = {
+    "run": "tcrctl.api.running",
+    "simulate": "tcrctl.api.running",
+    "Simulation": "tcrctl.api.running",
+    "load": "tcrctl.api.recorded",
+    "Run": "tcrctl.api.recorded",
+}
+
 watch_imports()
+
+
+def __getattr__(name: str) -> object:
+    """Load a part of the API, with the compiler flags of the command line."""
+    if name not in _API:
+        raise AttributeError(f"module 'tcrctl' has no attribute {name!r}")
+    from tcrctl.caches.flags import set_flags
+
+    set_flags()
+    return getattr(importlib.import_module(_API[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Return what there is, the API included."""
+    return sorted((*globals(), *_API))

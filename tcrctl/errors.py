@@ -168,19 +168,25 @@ class SafetyLimitError(StoppedError):
 
 
 class PictureError(StoppedError):
-    """Too little of what the cameras show can be believed; the drives were held.
-
-    Attributes:
-        doubts: What is not believed, and why.
-    """
+    """Too little of what the cameras show can be believed; ``doubts`` says what is not, and why."""
 
     def __init__(self, step: int, doubts: str) -> None:
-        super().__init__(
-            f"safety stop at step {step}: the cameras' picture is not believed: {doubts}",
-            step,
-            hint="tcrctl rig check; limits are in safety.picture, see docs/bench.md.",
-        )
+        text = f"safety stop at step {step}: the cameras' picture is not believed: {doubts}"
+        super().__init__(text, step, hint="tcrctl rig check; limits: safety.picture, docs/bench.md.")
         self.doubts = doubts
+
+
+class PluginStoppedError(StoppedError):
+    """Code from elsewhere failed while it ran, or returned what cannot be used.
+
+    Attributes:
+        plugin: Section and kind.
+        cause: What it did.
+    """
+
+    def __init__(self, plugin: str, cause: str) -> None:
+        super().__init__(f"stopped by {plugin}: {cause}")
+        self.plugin, self.cause = plugin, cause
 
 
 class TimeLimitError(StoppedError):
@@ -267,6 +273,27 @@ class ArmingRefusedError(StoppedError):
     def __init__(self, reasons: Sequence[str], *, hint: str = "") -> None:
         super().__init__(f"the drives are not armed: {'; '.join(reasons)}", hint=hint)
         self.reasons = tuple(reasons)
+
+
+class NotArrivedError(StoppedError):
+    """Drives stand elsewhere than they were sent.
+
+    Attributes:
+        wanted_mm: Where they were sent (m,) [mm].
+        reached_mm: Where they are (m,) [mm].
+    """
+
+    def __init__(self, names: Sequence[str], wanted_mm: Sequence[float], reached_mm: Sequence[float]) -> None:
+        self.wanted_mm, self.reached_mm = tuple(wanted_mm), tuple(reached_mm)
+        places = ", ".join(
+            f"{name} is at {at:.3f} mm, sent to {to:.3f} mm"
+            for name, to, at in zip(names, wanted_mm, reached_mm, strict=True)
+            if abs(at - to) >= 0.05
+        )
+        super().__init__(
+            f"the drives did not arrive: {places}",
+            hint="Limits on speed or step, another program that writes, a drive that does not follow?",
+        )
 
 
 class UntrustworthyDeviceError(DeviceError):

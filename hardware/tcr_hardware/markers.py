@@ -84,7 +84,7 @@ class Located:
         positions: Row by row (n, 3), single precision as cameras deliver them; NaN where not valid [m].
         valid: Which nodes are really seen (n,).
         reasons: Why not: ``no names``, ``unknown label``, ``missing``, ``occluded``, ``filled``, ``not finite``,
-            ``residual``, ``jump``; empty for a valid node.
+            ``residual``, ``jump``, or why the whole frame is doubted; empty for a valid node.
     """
 
     positions: NDArray[np.float32]
@@ -186,6 +186,8 @@ class MarkerMap:
         reasons[(reasons == "") & jumped] = "jump"
         if frame.models is None:
             reasons[self._named] = "no names"
+        if frame.doubt:
+            reasons[:] = frame.doubt
         valid = reasons == ""
         self._last[valid], self._last_at[valid] = found[valid], frame.taken_at
         found[~valid] = np.nan

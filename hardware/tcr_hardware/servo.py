@@ -91,6 +91,8 @@ class Servo:
         The wanted speed is error / lag, never more than what the drive can still brake from before the set-point,
         so that it does not overshoot.
         """
+        if not dt > 0.0:
+            return  # in no time nothing moves
         limits = self._settings
         setpoint = in_counts(self._arriving(setpoint, dt), limits.count_um)
         if self.jammed:

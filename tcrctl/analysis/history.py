@@ -15,11 +15,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.analysis.limits import Limits, read_limits
 from tcrctl.errors import InputError
 from tcrctl.experiment.run_folder import log_in
-from tcrctl.log.file_names import RESOLVED, ROBOT
+from tcrctl.experiment.singular import is_singular
 from tcrctl.log.reader import Log, read_log
-from tcrctl.log.run_files import RunFiles
 from tcrctl.robot.module import SIZE
 from tcrctl.signals import Array
 
@@ -28,34 +28,22 @@ _COLUMNS: Final = (
     "period",
     "reference_position",
     "reference_normal",
+    "measurement_t",
+    "measurement_nodes",
+    "measurement_valid",
+    "measurement_raw_delay",
     "measurement_drive",
     "applied_speed",
     "info_saturated",
+    "timing_read",
     "timing_estimate",
     "timing_control",
+    "timing_write",
     "timing_lateness",
 )
 #: What a simulated plant knows exactly and an estimator finds; the truth is shown where there is one.
 _STATE: Final = ("position", "normal", "tension", "q")
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What the run had to keep; None where its files do not say.
-
-    Attributes:
-        speed: Largest drive speed [m/s].
-        stroke: Smallest and largest drive length [m].
-        tension: Largest tension allowed [N].
-        floor: Smallest tension that the controller wants [N].
-        ceiling: Largest tension that the controller wants [N].
-    """
-
-    speed: float | None = None
-    stroke: tuple[float, float] | None = None
-    tension: float | None = None
-    floor: float | None = None
-    ceiling: float | None = None
+_AXES: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +66,10 @@ class History:
         tension: Cable tensions (n, m) [N].
         compute: Time that estimator and controller took (n,) [s].
         lateness: How late the step began (n,) [s]; 0 if nothing paced the run.
+        age: How old the camera picture was at the step (n,) [s].
+        answer: From the arrival of the camera frame to the answer of the drives (n,) [s]; NaN but on a rig.
+        innovation: How far the markers seen are from the model that the estimator has moved there, rms (n,) [m];
+            NaN in steps without a full state.
         shape_step: Steps whose shape is known (f,).
         shape: Node positions at these steps (f, n_nodes, 3) [m].
         limits: What had to be kept.
@@ -98,6 +90,9 @@ class History:
     tension: Array
     compute: Array
     lateness: Array
+    age: Array
+    answer: Array
+    innovation: Array
     shape_step: NDArray[np.int64]
     shape: Array
     limits: Limits
@@ -126,6 +121,12 @@ class History:
         apart, sum_ = self.normal - self.wanted_normal, self.normal + self.wanted_normal
         angle: Array = 2.0 * np.arctan2(np.linalg.norm(apart, axis=1), np.linalg.norm(sum_, axis=1))
         return angle
+
+    @property
+    def singular(self) -> NDArray[np.bool_]:
+        """Where theta_x of (45) says nothing (n,): the end looks along x, or shall."""
+        found: NDArray[np.bool_] = is_singular(self.normal) | is_singular(self.wanted_normal)
+        return found
 
     @property
     def angles(self) -> Array:
@@ -235,10 +236,39 @@ def _history(log: Log, label: str, begin: float | None, end: float | None) -> Hi
         tension=columns[f"{part}_tension"],
         compute=columns["timing_estimate"] + columns["timing_control"],
         lateness=columns["timing_lateness"],
+        age=columns["t"] - columns["measurement_t"],
+        answer=_answer(columns),
+        innovation=_innovation(log, columns),
         shape_step=shape_step,
         shape=shape,
-        limits=_limits(log),
+        limits=read_limits(log),
     )
+
+
+def _answer(columns: dict[str, NDArray[Any]]) -> Array:
+    """Return the time from a camera frame's arrival to the drives' answer (n,) [s]; NaN without frames."""
+    delay = columns.get("measurement_raw_delay")
+    if delay is None:
+        return np.full(len(columns["t"]), np.nan)
+    busy = np.sum([columns[f"timing_{part}"] for part in ("read", "estimate", "control", "write")], axis=0)
+    late = columns["timing_lateness"]
+    begun = columns["t"] + np.where(late <= columns["period"], late, 0.0)
+    found: Array = begun + busy - (columns["measurement_t"] + delay)
+    return found
+
+
+def _innovation(log: Log, columns: dict[str, NDArray[Any]]) -> Array:
+    """Return the rms distance of the markers seen from their nodes in the model (n,) [m]."""
+    nodes, seen, q = columns["measurement_nodes"], columns["measurement_valid"], columns["estimate_q"]
+    names = log.node_names
+    rows = [names.index(name) for name in log.marker_names if name in names]
+    if not rows or len(rows) != nodes.shape[1] or q.shape[1] != _AXES * len(names):
+        return np.full(len(q), np.nan)
+    apart = nodes - q.reshape(len(q), -1, _AXES)[:, rows]
+    square = np.where(seen, np.einsum("nmx,nmx->nm", apart, apart), 0.0)
+    with np.errstate(invalid="ignore"):
+        found: Array = np.sqrt(square.sum(axis=1) / seen.sum(axis=1))
+    return found
 
 
 def _shapes(q: NDArray[Any]) -> tuple[NDArray[np.int64], Array]:
@@ -247,27 +277,3 @@ def _shapes(q: NDArray[Any]) -> tuple[NDArray[np.int64], Array]:
         return np.zeros(0, np.int64), np.zeros((0, 0, 3))
     known = np.flatnonzero(np.isfinite(q).all(axis=1))
     return known, q[known].reshape(len(known), -1, 3).astype(np.float64)
-
-
-def _limits(log: Log) -> Limits:
-    """Read the limits in the attached files; a file of another version may lack any of them."""
-    files = RunFiles(log)
-    spec, robot = files.data(RESOLVED), files.data(ROBOT)
-    stroke = [_number(robot, "stroke_mm", end, scale=1e-3) for end in (0, 1)]
-    low, high = stroke
-    return Limits(
-        speed=_number(spec, "controller", "speed_limit_mm_s", scale=1e-3),
-        stroke=None if low is None or high is None else (low, high),
-        tension=_number(robot, "tension_limit_n"),
-        floor=_number(spec, "controller", "tension", "floor_n"),
-        ceiling=_number(spec, "controller", "tension", "ceiling_n"),
-    )
-
-
-def _number(data: Any, *path: str | int, scale: float = 1.0) -> float | None:
-    for key in path:
-        try:
-            data = data[key]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return scale * data if isinstance(data, int | float) else None

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.log.reader import read_log
+from tcrctl.analysis.result import paced, run_result
+from tcrctl.log.reader import Log, read_log
 from tcrctl.log.run_files import RunFiles, json_map
+from tcrctl.loop.measured_time import begun
 
-_BUSY = ("timing_read", "timing_estimate", "timing_control", "timing_write")
-_COLUMNS = ("k", "t", "period", *_BUSY, "timing_lateness", "info_converged")
+_COLUMNS = ("k", "t", "period", "timing_lateness")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,19 +41,21 @@ class LogInfo:
         reason: Why, or empty.
         steps: Steps that can be read.
         lost_steps: Step indices missing between 0 and the last one.
+        paced: Whether the clock paced the run; the following times are then measured ones, else those of the steps.
         duration_s: Time from the first step to the end of the last one [s].
         rate_hz: Mean step rate [Hz].
-        period_s: Control period [s].
-        jitter_ms: Deviation of successive step times from the period.
+        period_s: Median time between two steps [s].
+        jitter_ms: Deviation of the time between two steps from the control period.
         overruns: Steps that began late by more than a period or took longer than one; 0 if not paced.
         lateness_ms: By how much.
-        control_ms: Duration of the controller.
-        unconverged_steps: Steps whose inner problem was not solved.
+        control_ms: Duration of estimator and controller, as in ``run --json``.
+        unconverged_steps: Steps in which controller or estimator found no solution.
         events: Number of events by level.
         attachments: Names of the attached files.
         start: Metadata of the start: who, when, what ran.
         versions: Versions of packages, Python, processor.
         summary: Result of the run as in ``run --json``; empty if it was not recorded.
+        result: The same, measured from the steps where the log does not say it.
     """
 
     path: str
@@ -64,6 +67,7 @@ class LogInfo:
     reason: str
     steps: int
     lost_steps: int
+    paced: bool
     duration_s: float
     rate_hz: float | None
     period_s: float | None
@@ -77,16 +81,18 @@ class LogInfo:
     start: dict[str, str]
     versions: dict[str, str]
     summary: dict[str, Any]
+    result: dict[str, Any]
 
     @property
     def criteria(self) -> list[dict[str, Any]]:
-        """Criteria of the run with value and verdict, as in ``run --json``."""
-        found = self.summary.get("criteria", [])
-        return [item for item in found if isinstance(item, dict)] if isinstance(found, list) else []
+        """Criteria of the run with value and verdict, as in ``run --json``; a stopped run has passed none."""
+        found: list[dict[str, Any]] = self.result["criteria"]
+        return found
 
     def as_json(self) -> dict[str, Any]:
         """Return one object for ``info --json``; keys are the attributes, and ``criteria``."""
-        return {**asdict(self), "criteria": self.criteria}
+        facts = {name: value for name, value in asdict(self).items() if name != "result"}
+        return {**facts, "criteria": self.criteria}
 
 
 def inspect(path: str | os.PathLike[str]) -> LogInfo:
@@ -113,8 +119,8 @@ def inspect(path: str | os.PathLike[str]) -> LogInfo:
         status=stop.get("status", ""),
         reason=stop.get("reason", ""),
         steps=steps,
-        **_timing(columns),
-        unconverged_steps=int(np.count_nonzero(~columns["info_converged"])),
+        **_timing(columns, paced=paced(log)),
+        **_measures(log),
         events=dict(Counter(event.level for event in log.events())),
         attachments=list(log.attachments),
         start=log.start,
@@ -123,41 +129,40 @@ def inspect(path: str | os.PathLike[str]) -> LogInfo:
     )
 
 
-def _timing(columns: dict[str, NDArray[Any]]) -> dict[str, Any]:
-    k = columns["k"]
-    t = columns["t"]
+def _timing(columns: dict[str, NDArray[Any]], *, paced: bool) -> dict[str, Any]:
+    k, t, period = columns["k"], columns["t"], columns["period"]
     lateness = columns["timing_lateness"]
     if not len(k):
-        empty = {
-            "rate_hz": None,
-            "period_s": None,
-            "jitter_ms": None,
-            "lateness_ms": None,
-            "control_ms": None,
-        }
-        return {"lost_steps": 0, "duration_s": 0.0, "overruns": 0, **empty}
-    gaps, elapsed = np.diff(k), np.diff(t)
-    deviation = np.abs(elapsed - columns["period"][:-1])[gaps == 1]
-    span = float(t[-1] - t[0])
+        empty = dict.fromkeys(("rate_hz", "period_s", "jitter_ms", "lateness_ms"))
+        return {"lost_steps": 0, "paced": paced, **empty}
+    at = begun(t, lateness, period) if paced else t
+    neighbours = np.diff(k) == 1
+    between = np.diff(at)[neighbours]
+    span = float(at[-1] - at[0])
     return {
         "lost_steps": int(k.max()) + 1 - len(np.unique(k)),
-        "duration_s": span + float(columns["period"][-1]),
+        "paced": paced,
         "rate_hz": float(k[-1] - k[0]) / span if span > 0.0 else None,
-        "period_s": float(np.median(columns["period"])),
-        "jitter_ms": _spread(deviation),
-        "overruns": _overruns(columns),
+        "period_s": float(np.median(between if paced and len(between) else period)),
+        "jitter_ms": _spread(np.abs(between - period[:-1][neighbours])),
         "lateness_ms": _spread(lateness),
-        "control_ms": _spread(columns["timing_control"]),
     }
 
 
-def _overruns(columns: dict[str, NDArray[Any]]) -> int:
-    """Count overruns as the run itself does; only a paced run is ever late."""
-    lateness = columns["timing_lateness"]
-    busy = np.sum([columns[name] for name in _BUSY], axis=0)
-    return (
-        int(np.count_nonzero(np.maximum(lateness, busy) > columns["period"])) if np.any(lateness > 0.0) else 0
+def _measures(log: Log) -> dict[str, Any]:
+    """Return what the result of the run says too, with the same numbers."""
+    result = run_result(log)
+    control = result.get("control_ms")
+    known = isinstance(control, dict) and all(
+        isinstance(control.get(n), float) for n in ("p50", "p99", "max")
     )
+    return {
+        "result": result,
+        "duration_s": float(result.get("duration_s") or 0.0),
+        "overruns": int(result.get("overruns") or 0),
+        "unconverged_steps": int(result.get("unconverged_steps") or 0),
+        "control_ms": Spread(**{n: control[n] for n in ("p50", "p99", "max")}) if control and known else None,
+    }
 
 
 def _spread(seconds: NDArray[np.float64]) -> Spread | None:

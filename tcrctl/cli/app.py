@@ -13,11 +13,13 @@ from typing import Annotated
 import typer
 
 from tcrctl import __version__
+from tcrctl.caches.flags import set_flags
 from tcrctl.cli.diff import diff
 from tcrctl.cli.emulate import emulate
 from tcrctl.cli.export import export
 from tcrctl.cli.identify import identify
 from tcrctl.cli.info import info
+from tcrctl.cli.kinds import kinds
 from tcrctl.cli.list import list_shipped
 from tcrctl.cli.new import new
 from tcrctl.cli.paper import paper
@@ -47,6 +49,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "workspace": workspace,
     "identify": identify,
     "list": list_shipped,
+    "kinds": kinds,
     "show": show,
     "validate": validate,
     "new": new,
@@ -65,7 +68,7 @@ VERBS: dict[str, Callable[..., None]] = {
 }
 
 #: Verbs of which nothing is left if their output cannot be written.
-ONLY_SAY = ("list", "show", "schema", "info", "runs", "diff")
+ONLY_SAY = ("list", "kinds", "show", "schema", "info", "runs", "diff")
 
 
 def _print_version(wanted: bool) -> None:
@@ -148,13 +151,8 @@ def _with_delivery(code: int, given: list[str], output: Output) -> int:
 
 
 def _prepare_process(environment: MutableMapping[str, str]) -> None:
-    """Set what libraries read when they are loaded.
-
-    Threads for the small matrices of a control step would only wait for each other. The kernels gain nothing from
-    the compiler's higher levels, and a cold start is a fifth shorter without them.
-    """
-    environment.setdefault("OPENBLAS_NUM_THREADS", "1")
-    environment.setdefault("NUMBA_OPT", "1")
+    """Set what libraries read when they are loaded."""
+    set_flags(environment)
     for size in ("COLUMNS", "LINES"):  # 0 stands for unknown, and would be taken for no room at all
         if environment.get(size, "1").strip("0") == "":
             del environment[size]

@@ -27,9 +27,8 @@ def calibrate_log(log: str, changes: Sequence[str], out: Path, say: Say, as_json
         print(json.dumps(found.result.as_json(robot, calibration)))
     else:
         _print(found.result)
-        rubs = " --set controller.dither.least_mm=2" if found.result.rubbing.rubs else ""
         setting = shlex.quote(f"estimator.calibration={calibration}")
-        print(f"next run: tcrctl run SPEC --set {setting}{rubs}")
+        print(f"next run: tcrctl run SPEC --set {setting}")
         print(f"the robot as it was found, to look at or to try as robot: {robot}")
     return 0 if found.result.fit.converged else 1
 

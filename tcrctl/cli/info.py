@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from tcrctl.cli.console import console, escaped
@@ -37,14 +38,15 @@ def _print_tables(found: LogInfo) -> None:
     from rich.table import Table
 
     screen = console()
-    provenance = {**found.start, **found.versions}
-    for title, rows in (("", _facts(found)), ("provenance", provenance), ("criteria", _criteria(found))):
+    provenance = {**found.start, **found.versions}.items()
+    told = (("", _facts(found).items()), ("result", [*_result(found)]), ("provenance", provenance))
+    for title, rows in told:
         if not rows:
             continue
         table = Table(title=title, title_justify="left", show_header=False, box=None)
         table.add_column(style="bold", no_wrap=True)
         table.add_column(overflow="fold")
-        for name, value in rows.items():
+        for name, value in rows:
             table.add_row(escaped(name), escaped(value))
         screen.print(table)
 
@@ -59,24 +61,33 @@ def _facts(found: LogInfo) -> dict[str, Any]:
         "complete": "recovered; the end may be missing" if found.recovered else complete,
         "duration": f"{found.duration_s:.3f} s",
         "steps": f"{found.steps}{rate}, {found.lost_steps} lost, {found.unconverged_steps} unconverged",
-        "jitter": _milliseconds(found.jitter_ms),
-        "control time": _milliseconds(found.control_ms),
-        "overruns": f"{found.overruns}; lateness {_milliseconds(found.lateness_ms)}",
+        "jitter": _milliseconds(found.jitter_ms) if found.paced else "none: no clock paced the run",
+        "overruns": f"{_overruns(found)}; lateness {_milliseconds(found.lateness_ms)}",
         "events": ", ".join(f"{count} {level}" for level, count in found.events.items()) or "none",
         "attachments": ", ".join(found.attachments) or "none",
         "size": f"{found.size_bytes} bytes{per_step}",
     }
 
 
+def _overruns(found: LogInfo) -> str:
+    return f"{found.overruns}, {100.0 * found.overruns / found.steps:.3g} %" if found.overruns else "0"
+
+
 def _milliseconds(spread: Spread | None) -> str:
     if spread is None:
         return "unknown"
-    return f"p50 {spread.p50:.3f} ms, p99 {spread.p99:.3f} ms, max {spread.max:.3f} ms"
+    from tcrctl.experiment.headline import number
+
+    parts = {"p50": spread.p50, "p99": spread.p99, "max": spread.max}
+    return ", ".join(f"{name} {number(round(value, 6), 'ms')}" for name, value in parts.items())
 
 
-def _criteria(found: LogInfo) -> dict[str, str]:
-    return {
-        str(item.get("name")): f"{'passed' if item.get('passed') else 'FAILED'}: {item.get('value')} "
-        f"{item.get('unit') or ''}, limit {item.get('limit')}"
-        for item in found.criteria
-    }
+def _result(found: LogInfo) -> Iterator[tuple[str, str]]:
+    """Yield the measures and criteria of the run as ``run`` prints them."""
+    from tcrctl.experiment.headline import headline
+    from tcrctl.experiment.judgement import judgements
+    from tcrctl.experiment.task_words import findings
+
+    yield from ((line.name, line.text) for line in headline(found.result) if line.first)
+    yield from ((finding.subject, finding.text) for finding in findings(found.result.get("task")))
+    yield from ((judgement.name, judgement.text) for judgement in judgements(found.result))

@@ -40,6 +40,16 @@ Plot = Annotated[
 ]
 
 
+Plugins = Annotated[
+    Path | None,
+    typer.Option(
+        "--plugins",
+        metavar="FOLDER",
+        help="Holds the files of kinds that are not built in; they are run, so read them first.",
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Compared:
     """Which steps are compared, and how strictly."""
@@ -57,6 +67,7 @@ def replay(
     compared: Compared = Compared(),
     out: Out = None,
     plot: Plot = None,
+    plugins: Plugins = None,
     as_json: AsJson = False,
 ) -> None:
     """Feed a log to its own controller, and compare commands, estimates and tensions bit for bit.
@@ -67,6 +78,9 @@ def replay(
     With --set, settings of controller, estimator or safety change: what would
     it have done with the same input? The robot does not answer to it; for
     that, run the experiment again.
+
+    Code that a log carries, or names, is not run. If its controller came from
+    a file or module, --plugins says where you have it.
 
     Exit code 0 if every step is identical, 3 if one is not, or if steps in
     between are missing.
@@ -92,6 +106,7 @@ def replay(
             window=window,
             tolerance=Tolerance(compared.atol, compared.rtol),
             out=out,
+            plugins=plugins,
             watch=None if drawing is None else drawing.add,
             announce=_announce,
             progress=progress,

@@ -27,6 +27,7 @@ def schema(
     """
     from tcrctl.config.settings import Settings
     from tcrctl.errors import InputError
+    from tcrctl.experiment.plugged import with_registered
     from tcrctl.experiment.spec import ExperimentSpec
     from tcrctl.identify.settings import IdentificationSpec
     from tcrctl.plant.rig.settings import RigFile
@@ -42,6 +43,6 @@ def schema(
     wanted = [kind for given, kind in kinds if given]
     if len(wanted) > 1:
         raise InputError("give --robot, --rig, --identification or --study, not several of them")
-    model = wanted[0] if wanted else ExperimentSpec
+    model = wanted[0] if wanted else with_registered(ExperimentSpec)
     made = {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema()}
     print(json.dumps(made, indent=2))

@@ -15,6 +15,7 @@ from tcrctl.plant.rig.devices import DriveStatus, Sighting
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.modbus_drives import ModbusDrives
 from tcrctl.plant.rig.natnet_cameras import NatNetCameras
+from tcrctl.plant.rig.settings import SafetyRules
 from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot
 
@@ -26,6 +27,8 @@ READS: Final = 100
 ELSEWHERE: Final = 0.1
 #: Sides of measured rings may differ so much from those of the robot; more means a wrong unit or label.
 SIDE_ERROR: Final = 0.05
+#: Older servers do not tell when a frame was taken.
+OLDEST_WITH_CLOCK: Final = (3, 0)
 NOT_READY: Final = 4
 WRONG_FILE: Final = InputError.exit_code
 NO_DEVICE: Final = DeviceError.exit_code
@@ -45,7 +48,7 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
         yield Finding("cameras", str(error), error.exit_code)
     else:
         try:
-            yield from _check_cameras(cameras, robot)
+            yield from _check_cameras(cameras, robot, loaded.rig.safety)
         except DeviceError as error:
             yield Finding("cameras", str(error), error.exit_code)
         finally:
@@ -63,7 +66,7 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
         drives.close()
 
 
-def _check_cameras(cameras: NatNetCameras, robot: Robot) -> Iterator[Finding]:
+def _check_cameras(cameras: NatNetCameras, robot: Robot, rules: SafetyRules) -> Iterator[Finding]:
     server = cameras.client.server
     if server is not None:
         who = f"{server.application}, NatNet {cameras.client.version}"
@@ -78,16 +81,32 @@ def _check_cameras(cameras: NatNetCameras, robot: Robot) -> Iterator[Finding]:
         yield Finding("frames", f"none within {WATCHED:g} s", NO_DEVICE)
         return
     counts = cameras.client.statistics()
-    delay = 1e3 * np.median([sighting.raw.delay for sighting in seen])
     text = f"{len(seen)} in {WATCHED:g} s, {counts.lost} lost, {counts.malformed} malformed"
-    text += f", {delay:.1f} ms old on arrival"
     yield Finding("frames", text, 0 if len(seen) > 0.5 * cameras.rate * WATCHED else NOT_READY)
+    yield _age(cameras, 1e3 * float(np.median([sighting.raw.delay for sighting in seen])), rules)
+    if counts.strangers:
+        text = f"frames of a second source: {counts.strangers}; {counts.last_problem}"
+        yield Finding("source", text, NOT_READY)
     valid = np.mean([sighting.valid for sighting in seen], axis=0)
     always = int(np.count_nonzero(valid == 1.0))
     doubts = f"; last frame: {seen[-1].doubts}" if seen[-1].doubts else ""
     text = f"{always} of {cameras.mapped} in every frame{doubts}"
     yield Finding("markers", text, 0 if always == cameras.mapped else NOT_READY)
     yield from _check_places(seen[-1], robot)
+
+
+def _age(cameras: NatNetCameras, delay: float, rules: SafetyRules) -> Finding:
+    """Judge how old frames are when they arrive; ``delay`` is the median [ms]."""
+    client = cameras.client
+    if client.version is not None and client.version < OLDEST_WITH_CLOCK:
+        return Finding("age", f"not told by NatNet {client.version}; counted from the arrival")
+    impossible = client.statistics().impossible
+    text = f"{delay:.1f} ms on arrival"
+    if impossible:
+        return Finding("age", f"{impossible} frames with impossible time stamps; otherwise {text}", NOT_READY)
+    if not 0.0 <= delay < rules.stale_after_ms:
+        return Finding("age", f"{text}, limit {rules.stale_after_ms:g} ms (safety.stale_after_ms)", NOT_READY)
+    return Finding("age", text)
 
 
 def _check_places(sighting: Sighting, robot: Robot) -> Iterator[Finding]:

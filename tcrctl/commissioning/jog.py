@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tcrctl.commissioning.without_cameras import WithoutCameras
-from tcrctl.errors import InputError
+from tcrctl.errors import InputError, NotArrivedError
 from tcrctl.loop.loop import step_count
 from tcrctl.loop.pacing import RealTime
 from tcrctl.plant.rig.assembly import connect_drives, envelope, supervisor_rules
@@ -21,6 +21,10 @@ from tcrctl.signals import Array, Command
 
 #: Period of the writes [s].
 PERIOD = 0.02
+#: Drives nearer than this to where they shall be have arrived [m].
+ARRIVED = 1e-4
+#: How long drives may lag behind the end of the motion [s].
+PATIENCE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +71,7 @@ def jog_rig(
 
     Raises:
         InputError: If the motion leaves the limits.
-        StoppedError: If the drives are not ready, or the supervisor stops them.
+        StoppedError: If the drives are not ready, do not arrive, or the supervisor stops them.
         DeviceError: If they do not answer.
     """
     rules = loaded.rig.safety
@@ -95,9 +99,26 @@ def jog_rig(
             pace.wait(k * PERIOD)
             plant.read()
             plant.write(Command(distance * _rate(k, duration), start))
+        _arrive(plant, pace, names, start + distance, k)
     finally:
         plant.close()
     return {**result, "to_mm": _by_name(names, 1e-6 * plant.position().astype(float))}
+
+
+def _arrive(plant: RigPlant, pace: RealTime, names: tuple[str, ...], target: Array, k: int) -> None:
+    """Wait until the drives are where they shall be, counting steps from ``k`` on.
+
+    Raises:
+        NotArrivedError: If they are not there in time.
+    """
+    still = Command(np.zeros(len(names)), target)
+    for late in range(1, step_count(PATIENCE, PERIOD) + 1):
+        pace.wait((k + late) * PERIOD)
+        plant.read()
+        plant.write(still)
+        if np.abs(1e-6 * plant.position() - target).max() <= ARRIVED:
+            return
+    raise NotArrivedError(names, (1e3 * target).tolist(), (1e-3 * plant.position()).tolist())
 
 
 def _rate(k: int, duration: float) -> float:

@@ -25,6 +25,8 @@ class Settings(BaseModel):
 
     #: Keys that were here before, and the section below this one that has them now.
     moved: ClassVar[Mapping[str, str]] = {}
+    #: Where its kind comes from, if it is no built-in one; see :mod:`tcrctl.plugins.plugin`.
+    plugin: ClassVar[object | None] = None
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         """Return itself: settings never change."""

@@ -86,6 +86,14 @@ def shadowed(name: str) -> Path | None:
     return local if not is_path(name) and _is_file(local) else None
 
 
+def notes(name: str) -> tuple[str, ...]:
+    """Return what the user should know about the name of an experiment."""
+    local = shadowed(name)
+    if local is None:
+        return ()
+    return (f"{name} is the experiment that comes with the program; ./{local} in this folder is not read",)
+
+
 #: Sections that only files of one kind have, what those are, and what they are for.
 _SECTIONS: dict[str, tuple[str, str]] = {
     "modules": ("a robot file", "Name it in an experiment, robot: {}; tcrctl validate --robot {} checks it."),

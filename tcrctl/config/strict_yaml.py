@@ -60,6 +60,11 @@ class Document:
                 return self._overridden[path[:length]]
         return position(self.name, self._mark(path))
 
+    def is_override(self, path: Keys) -> bool:
+        """Tell whether a value, or something around it, was given on the command line."""
+        ends = (path[:length] for length in range(1, len(path) + 1))
+        return any(self._overridden.get(end, "").startswith("--set") for end in ends)
+
     def problem(self, keys: Keys, message: str) -> Problem:
         """Return what is wrong with a value, with its place.
 

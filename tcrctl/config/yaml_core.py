@@ -59,6 +59,13 @@ class _Dumper(yaml.SafeDumper):
     def ignore_aliases(self, data: Any) -> bool:
         return True
 
+    def represent_str(self, data: str) -> ScalarNode:
+        """Quote what begins or ends with a blank that is no space: unquoted it would be refused when read."""
+        return self.represent_scalar(_TAG + "str", data, style='"' if outer_blank(data) else None)
+
+
+_Dumper.add_representer(str, _Dumper.represent_str)
+
 
 def position(name: str, mark: Any) -> str:
     """Return ``file:line:column``, counted from 1, of a PyYAML mark (None: the start)."""

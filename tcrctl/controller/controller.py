@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, cast
 
 from tcrctl.controller.instantaneous import InstantaneousOptimalControl
 from tcrctl.controller.kinematic import Kinematic
 from tcrctl.controller.literal import LiteralIoc
 from tcrctl.controller.open_loop import OpenLoop
+from tcrctl.controller.own import OwnController
 from tcrctl.controller.plan import Planner
 from tcrctl.controller.settings import (
     ControllerSection,
@@ -16,8 +17,10 @@ from tcrctl.controller.settings import (
     IocSettings,
     KinematicSettings,
     OpenLoopSettings,
+    OwnControllerSection,
 )
 from tcrctl.controller.shell import Shell
+from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, ControlInfo, Estimate, Reference
 
@@ -59,6 +62,13 @@ KINDS: Final[Mapping[str, tuple[type[ControllerSection], Callable[[Any, Robot], 
 
 
 def build_controller(settings: ControllerSettings, robot: Robot) -> Controller:
-    """Build the controller of a ``controller:`` section."""
+    """Build the controller of a ``controller:`` section.
+
+    Raises:
+        InputError: If one from elsewhere cannot be built.
+    """
+    plugin = plugin_of(settings)
+    if plugin is not None:
+        return OwnController(cast(OwnControllerSection, settings), plugin, robot)
     _, build = KINDS[settings.kind]
     return build(settings, robot)

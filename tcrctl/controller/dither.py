@@ -28,6 +28,8 @@ from tcrctl.robot.robot import Robot
 from tcrctl.robot.swing import signs
 from tcrctl.signals import Array, Estimate
 
+#: By how much larger an innovation has to be to say that cables rub that did not while they were probed.
+CONVINCING: Final = 5.0
 #: From this amplitude on a robot counts as dithered, with weights and gains of its own [m].
 AWAKE: Final = 0.5e-3
 
@@ -98,6 +100,11 @@ class Dither:
         return self.thrown is not None and self.thrown > self._settings.rubs_mm / 1e3
 
     @property
+    def slides(self) -> bool:
+        """Whether the probing wave has told that they do not."""
+        return self.thrown is not None and not self.rubs
+
+    @property
     def now(self) -> Dithered:
         """Amplitude and speed, and where the drives are in the wave."""
         fastest = 2.0 * self.amplitude / (self._half_wave * self._period)
@@ -162,7 +169,7 @@ class Dither:
     def _rate(self) -> float:
         """Return by how much the amplitude grows [m/s]."""
         amplitude, innovation = self._sizes
-        excess = innovation - self._settings.threshold_mm / 1e3
+        excess = innovation - self._settings.threshold_mm / 1e3 * (CONVINCING if self.slides else 1.0)
         return float(
             self._settings.growth_1_s * excess if excess > 0.0 else -amplitude / self._settings.release_s
         )

@@ -240,6 +240,21 @@ class OpenLoopSettings(ControllerSection):
     speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
 
 
+class OwnControllerSection(ControllerSection):
+    """Base of the settings of controllers from elsewhere."""
+
+    #: What of the end is fed back, if the class does not leave that to its settings.
+    feeds_back: ClassVar[Literal["position", "pose"] | None] = "position"
+
+    period_s: float = quantity("s", "control period", 0.05, gt=0, le=10)
+    speed_limit_mm_s: float = quantity("mm/s", "hard limit of every drive speed", 50.0, gt=0)
+
+    @property
+    def tracks(self) -> Literal["position", "pose"] | None:
+        """What of the end is fed back; pose needs a trajectory with an orientation."""
+        return self.feeds_back
+
+
 ControllerSettings: TypeAlias = Annotated[
     IocSettings | KinematicSettings | OpenLoopSettings, Field(discriminator="kind")
 ]
@@ -259,6 +274,6 @@ def shaken_integral(settings: IocSettings | KinematicSettings) -> float:
     return min(1.0, settings.shaking.integral_gain_1_s / settings.integral.gain_1_s)
 
 
-def speed_limit(settings: ControllerSettings) -> float:
+def speed_limit(settings: ControllerSettings | OwnControllerSection) -> float:
     """Return the hard limit of every drive speed [m/s]."""
     return settings.speed_limit_mm_s / 1000.0

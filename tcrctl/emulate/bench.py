@@ -22,7 +22,7 @@ import numpy as np
 from tcr_hardware.emulators.motive import MotiveEmulator
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
-from tcr_hardware.emulators.plc_program import PlcLimitSettings
+from tcr_hardware.emulators.plc_limits import PlcLimitSettings
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.rigid_transform import RigidTransform
 from tcrctl.emulate.fault_script import FaultPlayer, FaultScript

@@ -15,7 +15,7 @@ DEFAULTS: Final = MotiveFaults()
 CHANGES: Final = {"version": "", "renamed": False}
 CAMERA_FAULTS: Final = (*(field.name for field in dataclasses.fields(MotiveFaults)), *CHANGES)
 #: Camera faults that are shares of all frames.
-SHARES: Final = ("loss", "duplicate", "corrupt", "truncate", "wrong_size")
+SHARES: Final = ("loss", "duplicate", "corrupt", "truncate", "wrong_size", "second_source")
 #: Camera faults that name markers, bodies, or either.
 MARKERS: Final = ("occluded", "missing", "nan", "swap")
 BODIES: Final = ("pivot", "moved_labels", "exchanged")

@@ -8,8 +8,10 @@ from typing import Any, Final, Protocol
 from tcrctl.config.settings import Settings
 from tcrctl.estimator.drives import BelievedDrives
 from tcrctl.estimator.exact import TrueState, build_exact
+from tcrctl.estimator.own import OwnEstimator
 from tcrctl.estimator.passive_observer import build_observer
 from tcrctl.estimator.settings import EstimatorSettings, ExactSettings, PassiveObserverSettings
+from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Command, Estimate, Measurement
 
@@ -52,7 +54,10 @@ def build_estimator(
         drives: Where the drives are believed to be, moved on by the estimator; None if they report it.
 
     Raises:
-        InputError: If the exact state is asked for where there is none.
+        InputError: If the exact state is asked for where there is none, or one from elsewhere cannot be built.
     """
+    plugin = plugin_of(settings)
+    if plugin is not None:
+        return OwnEstimator(settings, plugin, robot, period)
     _, build = KINDS[settings.kind]
     return build(settings, robot, period, state, drives or BelievedDrives(None, 0.0, "encoder", period))

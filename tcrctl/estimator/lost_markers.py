@@ -1,9 +1,11 @@
 """Markers that cameras lose for a moment, filled in where they must be.
 
 Every marker sits about a millimetre beside its node. A ring that loses one of three for a frame would seem to jump
-by that, and the end normal with it; so a lost marker is put on its node, as far beside it as it was. A ring that
-is lost whole would let go of all that a wrong model has stored in the module above, and jump by millimetres; for a
-moment it is taken to move on as it did.
+by that, and the end normal with it; a ring that is lost whole would let go of all that a wrong model has stored in
+the module above. So a lost marker is filled in, where its neighbours carry it (``carried_rings``).
+
+Nothing of the model is needed for that. What the model would say of the next frame is its speed, a difference of
+two frames: with a dither of four frames a wave it points beyond every turn.
 """
 
 from __future__ import annotations
@@ -12,54 +14,37 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tcrctl.signals import Array, Measurement
+from tcrctl.estimator.carried_rings import carry
+from tcrctl.robot.module import RING
+from tcrctl.signals import Measurement
 
-#: Markers of one ring.
-RING: Final = 3
-#: A lost marker is filled in for so long [s]; then it counts as not seen.
+#: A lost marker is filled in for so long [s]; then it counts as not seen. A ring that is lost whole begins anew.
 LONGEST: Final = 0.5
-#: The same for the markers of a ring that is lost whole: nothing but its speed says where it is.
-LONGEST_RING: Final = 0.1
-#: Time constant of the mean place of a marker beside its node [s].
-FILTER: Final = 1.0
 
 
 class LostMarkers:
-    """Remembers where markers sit beside their nodes; a frame with all markers passes as it is."""
+    """Remembers the last place of every marker; a frame with all markers passes as it is."""
 
     def __init__(self, count: int, period: float) -> None:
         """Take the number of markers and the control period [s]."""
         self._period = period
-        self._missing, self._known = np.zeros(count), np.zeros(count, dtype=np.bool_)
-        self._beside = np.zeros((count, 3))
+        self._missing, self._rings_missing = np.zeros(count), np.zeros(count // RING)
+        self._known = np.zeros(count, dtype=np.bool_)
+        self._places = np.zeros((count, 3))
 
-    def filled(self, measured: Measurement, expected: Array) -> Measurement:
-        """Return the frame with markers filled in that were lost a moment ago.
-
-        Args:
-            measured: The frame.
-            expected: Where the nodes of all markers will be by the model (n_markers, 3) [m].
-        """
-        self._missing = np.where(measured.valid, 0.0, self._missing + self._period)
-        of_seen_ring = np.repeat(measured.valid.reshape(-1, RING).any(axis=1), RING)
-        longest = np.where(of_seen_ring, LONGEST, LONGEST_RING)
-        fill = (self._missing > 0.0) & (self._missing < longest) & self._known
+    def filled(self, measured: Measurement) -> Measurement:
+        """Return the frame with markers filled in that were lost a moment ago."""
+        seen = measured.valid
+        self._missing = np.where(seen, 0.0, self._missing + self._period)
+        places = measured.nodes.astype(np.float64)
+        carry(self._places, places, seen, self._known)
+        self._places, self._known = places, self._known | seen
+        ring_seen = seen.reshape(-1, RING).any(axis=1)
+        self._rings_missing = np.where(ring_seen, 0.0, self._rings_missing + self._period)
+        since = np.where(np.repeat(ring_seen, RING), self._missing, np.repeat(self._rings_missing, RING))
+        fill = ~seen & (since < LONGEST) & self._known
         if not fill.any():
             return measured
-        nodes = np.where(fill[:, None], expected + self._beside, measured.nodes)
-        return replace(measured, nodes=nodes.astype(measured.nodes.dtype), valid=measured.valid | fill)
-
-    def remember(self, seen: NDArray[np.bool_], markers: NDArray[np.float32], nodes: Array) -> None:
-        """Filter how far the seen markers are beside their nodes.
-
-        Args:
-            seen: Which markers the frame really had (n_markers,).
-            markers: Their places (n_markers, 3) [m].
-            nodes: Places of their nodes by the estimate (n_markers, 3) [m].
-        """
-        blend = np.where(self._known, -np.expm1(-self._period / FILTER), 1.0)[:, None]
-        moved = self._beside + blend * (markers - nodes - self._beside)
-        self._beside = np.where(seen[:, None], moved, self._beside)
-        self._known |= seen
+        nodes = np.where(fill[:, None], places, measured.nodes)
+        return replace(measured, nodes=nodes.astype(measured.nodes.dtype), valid=seen | fill)

@@ -154,16 +154,14 @@ class PassiveObserver:
         if self._fits and measured.valid.any():
             self._fit(measured)
             self._fits = False
-        seen = measured.valid
         if self._holds:
-            measured = self._lost.filled(measured, self._at_markers(self._q + self._period * self._v))
+            measured = self._lost.filled(measured)
         load = self._load(measured)
         q = self._q.copy()
         model, drive = self._robot.model, measured.drive
         outcome = minimise(model, q, drive, load, self._work, TOLERANCE, MAX_ITERATIONS, False)
         if outcome.converged:
             self._v, self._q, self._drive = (q - self._q) / self._period, q, drive.copy()
-        self._lost.remember(seen, measured.nodes, self._at_markers(self._q))
         position, normal = self._correct(measured)
         return Estimate(
             t=measured.t,

@@ -6,14 +6,13 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
-from tcrctl.config.settings import Settings, ShortKind, quantity
+from tcrctl.config.settings import ShortKind, quantity
 from tcrctl.estimator.calibration_settings import Calibrated, CalibrationSettings
+from tcrctl.estimator.section import EstimatorSection
 
 
-class PassiveObserverSettings(Settings):
+class PassiveObserverSettings(EstimatorSection):
     """Steps the model with the applied command, drawn to the measured rings by virtual springs."""
-
-    needs_every_step: ClassVar[bool] = False
 
     kind: Literal["passive_observer"]
     stiffness_n_m: float = quantity(
@@ -44,18 +43,12 @@ class PassiveObserverSettings(Settings):
         return self.calibration if isinstance(self.calibration, CalibrationSettings) else None
 
 
-class ExactSettings(Settings):
+class ExactSettings(EstimatorSection):
     """Passes the simulated plant's true state on; for studies on a simulated plant."""
 
-    #: The plant's state is its input, so a log from which it shall be replayed has it in every step.
     needs_every_step: ClassVar[bool] = True
 
     kind: Literal["exact"]
-
-    @property
-    def calibrated(self) -> None:
-        """No cameras are asked."""
-        return None
 
 
 EstimatorSettings: TypeAlias = Annotated[

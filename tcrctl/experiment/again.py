@@ -16,6 +16,7 @@ from typing import Any, Final
 from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, load_spec
+from tcrctl.experiment.table_file import kept_name
 from tcrctl.log.file_names import DESIGNED, RESOLVED, RIG, ROBOT
 
 #: Keys that name files, and the file beside the resolved experiment that is meant.
@@ -48,7 +49,8 @@ def _load_run(folder: Path, overrides: Sequence[str]) -> LoadedSpec:
             hint=f"tcrctl run {shlex.quote(str(spec))} takes the robot that has its name today.",
         )
     given = {text.partition("=")[0].strip() for text in overrides}
-    beside = {key: folder / name for key, name in _NAMED.items() if (folder / name).is_file()}
+    named = {**_NAMED, "trajectory.file": kept_name(str(_names(spec).get("trajectory.file")))}
+    beside = {key: folder / name for key, name in named.items() if (folder / name).is_file()}
     meant = {key: path for key, path in beside.items() if not _replaced(key, given)}
     texts = [f"{key}={json.dumps(str(path.absolute()))}" for key, path in meant.items()]
     loaded = load_spec(str(spec), (*texts, *overrides))
@@ -68,6 +70,9 @@ def _names(spec: Path) -> dict[str, Any]:
     plant = data.get("plant")
     if isinstance(plant, dict):
         names |= {"plant.robot": plant.get("robot"), "plant.rig": plant.get("rig")}
+    trajectory = data.get("trajectory")
+    if isinstance(trajectory, dict) and "file" in trajectory:
+        names["trajectory.file"] = trajectory["file"]
     return names
 
 
@@ -76,6 +81,8 @@ def _as_named(loaded: LoadedSpec, names: dict[str, Any], meant: dict[str, Path])
     spec = loaded.spec
     plant = {key.partition(".")[2]: names[key] for key in meant if key.startswith("plant.")}
     changes: dict[str, Any] = {"plant": spec.plant.model_copy(update=plant)} if plant else {}
+    if "trajectory.file" in meant:
+        changes["trajectory"] = spec.trajectory.model_copy(update={"file": names["trajectory.file"]})
     if "robot" in meant:
         changes["robot"] = names["robot"]
     return spec.model_copy(update=changes)

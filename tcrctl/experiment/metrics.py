@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tcrctl.experiment.singular import is_singular
+from tcrctl.experiment.spread import spread
 from tcrctl.experiment.summary import Measures, Numbers
+from tcrctl.loop.measured_time import beyond
 from tcrctl.numerics.rotation import angle_between, angles_from_normal
 from tcrctl.signals import Array, StepRecord
 
@@ -17,12 +19,15 @@ _COLUMNS = (
     "angle",
     "theta_x",
     "theta_y",
+    "singular",
     "tension_min",
     "tension_max",
     "saturated",
     "control",
     "latency",
     "overrun",
+    "busy",
+    "lateness",
     "iterations",
     "unsolved",
 )
@@ -60,20 +65,26 @@ class Metrics:
         error = np.stack([table[f"error_{axis}"] for axis in "xyz"], axis=1)
         return Measures(
             steps=self._steps,
-            duration_s=self._steps * self._period,
-            position_error_mm=_spread(1e3 * np.linalg.norm(error, axis=1), "max", "rms", "mean"),
-            x_error_mm=_spread(1e3 * error[:, 0], "max", "rms"),
-            orientation_error_deg=_spread(np.degrees(table["angle"]), "max", "rms"),
-            theta_x_error_rad=_spread(table["theta_x"], "max", "rms"),
-            theta_y_error_rad=_spread(table["theta_y"], "max", "rms"),
+            duration_s=self._steps * self._period + self._beyond(table),
+            position_error_mm=spread(1e3 * np.linalg.norm(error, axis=1), "max", "rms", "mean"),
+            x_error_mm=spread(1e3 * error[:, 0], "max", "rms"),
+            orientation_error_deg=spread(np.degrees(table["angle"]), "max", "rms"),
+            theta_x_error_rad=spread(table["theta_x"], "max", "rms"),
+            theta_y_error_rad=spread(table["theta_y"], "max", "rms"),
+            theta_singular_fraction=_share(table["singular"]),
             tension_n=self._tension(table),
             saturated_fraction=float(np.mean(table["saturated"])) if self._steps else None,
-            control_ms=_spread(1e3 * table["control"], "p50", "p99", "max"),
-            latency_ms=_spread(1e3 * table["latency"][~np.isnan(table["latency"])], "p50", "p99", "max"),
+            control_ms=spread(1e3 * table["control"], "p50", "p99", "max"),
+            latency_ms=spread(1e3 * table["latency"][~np.isnan(table["latency"])], "p50", "p99", "max"),
             overruns=int(np.sum(table["overrun"])),
-            inner_iterations=_spread(table["iterations"], "mean", "max"),
+            inner_iterations=spread(table["iterations"], "mean", "max"),
             unconverged_steps=int(np.sum(table["unsolved"])),
         )
+
+    def _beyond(self, table: dict[str, Array]) -> float:
+        """Return how much longer the run took than its periods [s]; nothing if no clock paced it."""
+        period = np.full(self._steps, self._period)
+        return beyond(table["lateness"], table["busy"], period) if self._paced else 0.0
 
     def _tension(self, table: dict[str, Array]) -> Numbers:
         if not self._steps:
@@ -82,15 +93,26 @@ class Metrics:
 
 
 def _errors(step: StepRecord) -> tuple[float, ...]:
-    """Return the position error (3) [m], angle between the normals, errors of the angles of (45) [rad] or NaN."""
+    """Return the position error (3) [m], angle between the normals, errors of the angles of (45) [rad] or NaN.
+
+    The last number is 1 where theta_x says nothing.
+    """
     end = step.estimate if step.truth is None else step.truth
     x, y, z = (end.position - step.reference.position).tolist()
     wanted = step.reference.normal
     if wanted is None:
-        return x, y, z, np.nan, np.nan, np.nan
+        return x, y, z, np.nan, np.nan, np.nan, np.nan
     is_x, is_y = angles_from_normal(end.normal)
     want_x, want_y = angles_from_normal(wanted)
-    return x, y, z, angle_between(end.normal, wanted), _wrapped(is_x - want_x), _wrapped(is_y - want_y)
+    singular = float(np.any(is_singular(np.stack((end.normal, wanted)))))
+    theta = _wrapped(is_x - want_x), _wrapped(is_y - want_y)
+    return x, y, z, angle_between(end.normal, wanted), *theta, singular
+
+
+def _share(flags: Array) -> float | None:
+    """Return the part of the steps that are flagged, of those that know; None if none does."""
+    known = flags[~np.isnan(flags)]
+    return float(np.mean(known)) if known.size else None
 
 
 def _wrapped(angle: float) -> float:
@@ -107,7 +129,7 @@ def _timing(step: StepRecord, paced: bool) -> tuple[float, ...]:
     took = step.timing
     busy = took.read + took.estimate + took.control + took.write
     overrun = paced and max(took.lateness, busy) > step.period
-    return took.estimate + took.control, _latency(step, busy), float(overrun)
+    return took.estimate + took.control, _latency(step, busy), float(overrun), busy, took.lateness
 
 
 def _latency(step: StepRecord, busy: float) -> float:
@@ -124,18 +146,3 @@ def _latency(step: StepRecord, busy: float) -> float:
 
 def _solution(step: StepRecord) -> tuple[float, ...]:
     return step.info.iterations, float(not (step.info.converged and step.estimate.converged))
-
-
-def _spread(values: NDArray[np.float64], *names: str) -> Numbers:
-    """Return what is asked for by name of the magnitudes of ``values`` (n,); None if there are none."""
-    if not values.size or np.isnan(values).all():
-        return None
-    size = np.abs(values)
-    found = {
-        "max": np.max(size),
-        "rms": np.sqrt(np.mean(size**2)),
-        "mean": np.mean(size),
-        "p50": np.quantile(size, 0.5),
-        "p99": np.quantile(size, 0.99),
-    }
-    return {name: float(found[name]) for name in names}

@@ -48,6 +48,8 @@ def summary_of(
         task=task,
     )
     verdicts = judge(spec.criteria, summary.as_json())
+    if failure is not None:  # nobody knows what would have come
+        verdicts = tuple(replace(verdict, passed=False) for verdict in verdicts)
     status, reason, exit_code = _outcome(failure, verdicts)
     return replace(summary, criteria=verdicts, status=status, reason=reason, exit_code=exit_code)
 

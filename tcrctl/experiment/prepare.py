@@ -24,12 +24,14 @@ from tcrctl.experiment.plant_robot import description_of_plant
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, with_draws
 from tcrctl.loop.loop import Parts, run_loop, step_count
 from tcrctl.loop.safety import SafetyGuard, SafetyLimits
+from tcrctl.plant.own import OwnPlant
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.realistic import rehearsal_plant
 from tcrctl.plant.rig.assembly import build_rig
 from tcrctl.plant.rig.operation import Operation, unheard
 from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
+from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.signals import StepRecord
 from tcrctl.task.task import Task, build_task, task_targets
@@ -38,11 +40,6 @@ from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
 
 #: Steps of the rehearsal that loads every kernel.
 WARM_UP_STEPS: Final = 3
-
-#: What to do if the picture is not believed.
-PICTURE_HINT: Final = (
-    "Labels and calibration: tcrctl rig check, tcrctl rig calibrate. Limits: safety.picture."
-)
 
 Notify = Callable[[str], None]
 PlantBuilder = Callable[[Any, "Experiment", Operation], tuple[RunnablePlant, TrueState | None]]
@@ -193,9 +190,14 @@ def build_plant(
 
     Raises:
         DeviceError: If it cannot be reached.
-        InputError: If a rig does not do what its file says.
+        InputError: If a rig does not do what its file says, or one from elsewhere cannot be built.
     """
     settings = experiment.spec.plant
+    plugin = plugin_of(settings)
+    if plugin is not None:
+        spec = experiment.spec
+        own = OwnPlant(settings, plugin, experiment.robot, experiment.period, spec.seed)
+        return own, None
     _, build = PLANTS[settings.kind]
     return build(settings, experiment, operation or Operation())
 

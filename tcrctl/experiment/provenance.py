@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
 import importlib.metadata
 import json
 import os
@@ -19,13 +18,29 @@ import numpy as np
 
 from tcrctl import __version__
 from tcrctl.config import strict_yaml
+from tcrctl.errors import InputError
 from tcrctl.experiment.plant_robot import description_of_plant
+from tcrctl.experiment.plugged import origins
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec
-from tcrctl.log.file_names import CAMERAS, DESIGNED, PLANT_ROBOT, RESOLVED, RIG, ROBOT, SPEC, VERSIONS
+from tcrctl.experiment.table_file import table_file
+from tcrctl.log.file_names import (
+    CAMERAS,
+    DESIGNED,
+    PLANT_ROBOT,
+    PLUGINS,
+    RESOLVED,
+    RIG,
+    ROBOT,
+    SPEC,
+    VERSIONS,
+)
 from tcrctl.plant.cameras import draw_cameras
 from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plugins.source import package_digest
 from tcrctl.robot.module import ring_rows
 
+#: Before the name of an attached file of code.
+PLUGIN_FILE: Final = "plugin."
 _PACKAGES: Final = (
     "foxglove-schemas-protobuf",
     "llvmlite",
@@ -61,6 +76,9 @@ def own_files(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, bytes]:
     }
     if loaded.rig is not None:
         files[RIG] = loaded.rig.given
+    for name, (_, content) in plugin_files(spec).items():
+        files[name.removeprefix(PLUGIN_FILE)] = content
+    files |= table_file(spec.trajectory)
     named = isinstance(spec.plant, SimulatedSettings) and isinstance(spec.plant.robot, str)
     if named and loaded.plant_robot is not None:
         files[DESIGNED] = strict_yaml.dumps(loaded.plant_robot.model_dump(mode="json")).encode()
@@ -84,8 +102,28 @@ def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str
         ROBOT: ("application/yaml", strict_yaml.read(loaded.robot_path)),
         **rig,
         **_drawn(loaded, spec),
+        **plugin_files(spec),
+        **{name: ("application/octet-stream", data) for name, data in table_file(spec.trajectory).items()},
         VERSIONS: ("application/json", json.dumps(versions(), indent=2).encode()),
     }
+
+
+def plugin_files(spec: ExperimentSpec) -> dict[str, tuple[str, bytes]]:
+    """Return where kinds come from that are not built in, and the text of those that are files.
+
+    Raises:
+        InputError: If two different files have the same name.
+    """
+    found = origins(spec)
+    if not found:
+        return {}
+    texts: dict[str, tuple[str, bytes]] = {}
+    for origin in found:
+        name = PLUGIN_FILE + Path(origin.file).name
+        if origin.text and texts.setdefault(name, ("text/x-python", origin.text))[1] != origin.text:
+            raise InputError(f"{origin.what}: another kind comes from another file of the same name")
+    table = json.dumps([origin.as_json() for origin in found], indent=2).encode()
+    return {PLUGINS: ("application/json", table), **texts}
 
 
 def _drawn(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str, bytes]]:
@@ -142,11 +180,8 @@ def processor() -> str:
 
 @cache
 def source_digest() -> str:
-    """Return the SHA-256 over the names and contents of all Python files of the package."""
-    digest, package = hashlib.sha256(), Path(__file__).parents[1]
-    for path in sorted(package.rglob("*.py")):
-        digest.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
+    """Return the digest of this program's Python files."""
+    return package_digest(Path(__file__).parents[1])
 
 
 def start_metadata(

@@ -51,6 +51,8 @@ from tcrctl.plant.rig.operation import Operation
 from tcrctl.robot.module import RIGID_BARS, module_of, ring_rows
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import StepRecord
+from tcrctl.task.settings import TaskSettings
+from tcrctl.task.task import task_drawing
 from tcrctl.trajectory.start_blend import StartBlend
 from tcrctl.trajectory.trajectory import Trajectory
 
@@ -111,7 +113,7 @@ def run_experiment(
             check()
 
         pace = RealTime(experiment.period, checked) if realtime else Unpaced(checked)
-        journal = Journal(pace.time, notify)
+        journal = Journal(pace.moment, notify)
         plant, state = build_plant(experiment, Operation(pace.time, journal.report, confirmed))
         try:
             parts, start_offset = build_parts(experiment, plant, state, journal.report)
@@ -143,7 +145,7 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap:
             Opening(
                 attachments=attachments(loaded, spec),
                 start=start_metadata(folder.run_id, loaded, spec, realtime=realtime),
-                geometry=log_geometry(experiment.robot, experiment.trajectory),
+                geometry=log_geometry(experiment.robot, experiment.trajectory, spec.task),
                 epoch_ns=time.time_ns(),
                 period_s=experiment.period,
                 full_state_s=spec.full_state_s,
@@ -157,8 +159,10 @@ def _open_log(experiment: Experiment, folder: RunFolder, *, realtime: bool, tap:
         raise
 
 
-def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeometry:
-    """Return the names and the topology that the log needs to draw a robot, and the path of its end."""
+def log_geometry(
+    robot: Robot, trajectory: Trajectory | None = None, task: TaskSettings | None = None
+) -> LogGeometry:
+    """Return the names and the topology that the log needs to draw a robot, the path of its end, and its task."""
     model, routes = robot.model, []
     for c, name in enumerate(robot.cable_names):
         holes = slice(model.first_hole[c], model.first_hole[c + 1])
@@ -172,6 +176,7 @@ def log_geometry(robot: Robot, trajectory: Trajectory | None = None) -> LogGeome
         module_of(robot.tip),
         springs=model.bar_nodes[RIGID_BARS * robot.n_modules :],
         reference_path=np.zeros((0, 3)) if trajectory is None else trajectory.position(points),
+        drawing=task_drawing(task),
     )
 
 
@@ -208,7 +213,7 @@ def _recorded_run(
         try:
             if failure is not None:
                 kind = "limit" if isinstance(failure, StoppedError) else "stop"
-                log.event(summary.measures.duration_s, kind, "error", str(failure))
+                log.event(parts.pace.moment(), kind, "error", str(failure))
             stop = {"status": summary.status, "reason": summary.reason}
             log.finish({**stop, "summary": json.dumps(summary.as_json())})
         except LogError as error:
@@ -231,6 +236,7 @@ def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogW
     except TcrctlError as error:
         failure = _in_mid_run(error) if started else error
     finally:
+        parts.pace.end()
         try:
             plant.close()
         except TcrctlError as error:  # what ended the run first is the reason

@@ -6,7 +6,7 @@ SPEC (name or path) -> strict YAML -> --set -> ExperimentSpec + RobotDescription
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -23,7 +23,9 @@ from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
 from tcrctl.experiment.calibration_file import with_calibration
 from tcrctl.experiment.criterion import CriterionText
 from tcrctl.experiment.plant_robot import plant_robot
+from tcrctl.experiment.plugged import trust_of, validated, with_plugins
 from tcrctl.experiment.summary import TASK, UNITS
+from tcrctl.experiment.table_file import with_table
 from tcrctl.picture.settings import PictureSettings
 from tcrctl.plant.realistic import as_drawn
 from tcrctl.plant.rig.file import LoadedRig, load_rig
@@ -214,26 +216,36 @@ def load_spec(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedSpec:
         InputError: If a file is missing.
     """
     path = shipped.find_experiment(name_or_path)
-    given = strict_yaml.read(path)
+    return read_spec(strict_yaml.read(path), path, overrides, shipped.notes(name_or_path))
+
+
+def read_spec(
+    given: bytes, path: Path, overrides: Sequence[str] = (), known: Iterable[str] = ()
+) -> LoadedSpec:
+    """Read an experiment from its text, and its robot.
+
+    Args:
+        given: The text.
+        path: Where it is from, for messages and relative paths.
+        overrides: As for :func:`load_spec`, which raises the same.
+        known: What the user should know already.
+    """
     document = strict_yaml.loads(given, str(path))
     written = document.data
     document, problems = _overridden(document, overrides)
-    document, notes = without_former_keys(document, written, ExperimentSpec)
-    spec, robot, robot_path = _validated(document, path.parent, problems)
+    model, unknown = with_plugins(document, ExperimentSpec, trust_of(path))
+    problems += unknown
+    document, notes = without_former_keys(document, written, model)
+    spec, robot, robot_path = _validated(document, path.parent, problems, model)
     document.refuse(misfits(spec, robot))
     estimator = with_calibration(document, spec.estimator, robot)
-    spec = spec.model_copy(update={"estimator": estimator})
+    trajectory = with_table(document, spec.trajectory)
+    spec = spec.model_copy(update={"estimator": estimator, "trajectory": trajectory})
     named = spec.plant.rig_file
     rig = None if named is None else load_rig(named, robot, path.parent)
     own = plant_robot(document, spec.plant, robot, robot_path)
-    notes = (*notes, *_which(name_or_path), *(f"robot {robot.name}: {text}" for text in doubts(robot)))
+    notes = (*notes, *known, *(f"robot {robot.name}: {text}" for text in doubts(robot)))
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, own, notes)
-
-
-def _which(name_or_path: str) -> Iterator[str]:
-    local = shipped.shadowed(name_or_path)
-    if local is not None:
-        yield f"{name_or_path} is the experiment that comes with the program; ./{local} in this folder is not read"
 
 
 def with_draws(spec: ExperimentSpec, cables: int, seed: int | None = None) -> ExperimentSpec:
@@ -264,14 +276,15 @@ def _overridden(
 
 
 def _validated(
-    document: strict_yaml.Document, folder: Path, problems: list[Problem]
+    document: strict_yaml.Document, folder: Path, problems: list[Problem], model: type[ExperimentSpec]
 ) -> tuple[ExperimentSpec, RobotDescription, Path]:
     """Return experiment and robot, or raise the problems of both after those already known."""
     robot, robot_path = None, Path()
     try:
-        spec = strict_yaml.validate(document, ExperimentSpec)
+        spec = validated(document, model)
     except SpecError as error:
-        problems += error.problems
+        known = {problem.key for problem in problems}
+        problems += [problem for problem in error.problems if problem.key not in known]
     name = document.data.get("robot") if isinstance(document.data, dict) else None
     if isinstance(name, str) and name:
         try:

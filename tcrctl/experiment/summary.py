@@ -19,6 +19,7 @@ _QUANTITIES: Final = {
     "orientation_error_deg": ("deg", ("max", "rms")),
     "theta_x_error_rad": ("rad", ("max", "rms")),
     "theta_y_error_rad": ("rad", ("max", "rms")),
+    "theta_singular_fraction": ("", ()),
     "tension_n": ("N", ("min", "max")),
     "saturated_fraction": ("", ()),
     "control_ms": ("ms", ("p50", "p99", "max")),
@@ -36,14 +37,15 @@ UNITS: Final[Mapping[str, str]] = {
 TASK: Final = "task."
 """Names that begin so are values that the task of the experiment defines."""
 
-_SUFFIXES: Final = {"mm": "mm", "rad": "rad", "deg": "deg", "s": "s"}
+SUFFIXES: Final = {"mm": "mm", "rad": "rad", "deg": "deg", "s": "s"}
+"""Endings of the names of a task's values, and the units that they stand for."""
 
 Numbers = dict[str, float] | None
 
 
 def unit_of(name: str) -> str:
     """Return the unit of a value of the result by its dotted name; names of a task's values end in theirs."""
-    return UNITS.get(name) or (_SUFFIXES.get(name.rpartition("_")[2], "") if name.startswith(TASK) else "")
+    return UNITS.get(name) or (SUFFIXES.get(name.rpartition("_")[2], "") if name.startswith(TASK) else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +58,7 @@ class Verdict:
         limit: The limit.
         value: The value; None if the run did not produce it, which fails the criterion.
         unit: Unit of both.
-        passed: The verdict.
+        passed: The verdict; false if the run did not come to its end, whatever the value.
     """
 
     name: str
@@ -68,7 +70,9 @@ class Verdict:
 
     def as_json(self) -> dict[str, Any]:
         """Return the item of ``criteria`` in ``run --json``."""
-        return {name: getattr(self, name) for name in ("name", "limit", "value", "unit", "passed")}
+        return {
+            name: getattr(self, name) for name in ("name", "relation", "limit", "value", "unit", "passed")
+        }
 
     def __str__(self) -> str:
         value = "unknown" if self.value is None else f"{_shown(self.value, '.4g')} {self.unit}".rstrip()
@@ -81,12 +85,13 @@ class Measures:
 
     Attributes:
         steps: Steps that were recorded.
-        duration_s: Time they cover [s].
+        duration_s: Time they took by the clock that paced them [s]; without one, the time they cover.
         position_error_mm: Distance of the end from where it was wanted: ``max``, ``rms``, ``mean``.
         x_error_mm: Its x component: ``max``, ``rms``.
         orientation_error_deg: Angle between end normal and wanted one: ``max``, ``rms``.
         theta_x_error_rad: Error of the first angle of (45): ``max``, ``rms``.
         theta_y_error_rad: Error of the second one.
+        theta_singular_fraction: Part of the steps in which the end looks along x, where the first one says nothing.
         tension_n: Over all cables and steps: ``min``, ``max``.
         saturated_fraction: Part of the steps in which some drive was at its speed limit.
         control_ms: Time that estimator and controller took in a step: ``p50``, ``p99``, ``max``.
@@ -104,6 +109,7 @@ class Measures:
     orientation_error_deg: Numbers
     theta_x_error_rad: Numbers
     theta_y_error_rad: Numbers
+    theta_singular_fraction: float | None
     tension_n: Numbers
     saturated_fraction: float | None
     control_ms: Numbers

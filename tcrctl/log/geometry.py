@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.log.drawing import Drawing
 from tcrctl.robot import module
 from tcrctl.signals import Array
 
@@ -43,6 +44,7 @@ class LogGeometry:
         full_scale_tension: Tension drawn in full red [N]; a slack cable is blue.
         springs: Node rows of the ends of every spring (n_springs, 2).
         reference_path: Points on the way that the end shall go (n, 3) [m]; may be empty.
+        drawing: What is drawn of the task.
 
     Raises:
         ValueError: If a node row or the tip ring does not exist.
@@ -55,6 +57,7 @@ class LogGeometry:
     full_scale_tension: float = 20.0
     springs: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     reference_path: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    drawing: Drawing = field(default_factory=Drawing)
 
     def __post_init__(self) -> None:
         holes = (row for cable in self.cables for row in cable.nodes.ravel().tolist())

@@ -7,6 +7,8 @@
 ``plant_robot.yaml``     the robot of a simulated plant, with everything drawn, if it was another one
 ``plant_cameras.json``   what was wrong with its cameras from beginning to end, if anything was drawn
 ``rig.yaml``             the bench, if there was one
+``plugins.json``         where kinds come from that are not built in: package, version, digest
+``plugin.NAME.py``       the text of such a kind that is a file; it is never run
 ``versions.json``        versions of everything that the numbers depend on
 =======================  ==========================================================================================
 """

@@ -18,7 +18,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -100,7 +100,7 @@ class LogWriter:
         self._limit = max(_QUEUE_MIN_STEPS, math.ceil(_QUEUE_S / period_s))
         self._queue: SimpleQueue[StepRecord | Event | dict[str, str]] = SimpleQueue()
         self._turn, self._written = threading.Event(), threading.Event()
-        self._in_turn = 0
+        self._in_turn, self._event_t = 0, 0.0
         self._failure: Exception | None = None
         self._displaced = ""
         self._finished = self._reported = False
@@ -132,14 +132,18 @@ class LogWriter:
             self._let_write()
 
     def event(self, t: float, kind: str, level: str, message: str) -> None:
-        """Log an event at time ``t`` [s]; see :class:`tcrctl.log.event.Event`.
+        """Log an event at time ``t`` [s], or at that of the event before if it was later: they are in order.
+
+        See :class:`tcrctl.log.event.Event`.
 
         Raises:
             LogError: As :meth:`step`.
             ValueError: If the level is unknown.
         """
         self._check()
-        self._queue.put(Event(t, kind, level, message))
+        made = Event(t, kind, level, message)
+        self._event_t = max(self._event_t, made.t)
+        self._queue.put(replace(made, t=self._event_t))
 
     def finish(self, stop: Mapping[str, str]) -> None:
         """Write everything logged so far and metadata ``tcrctl.run.stop``, and close the file.

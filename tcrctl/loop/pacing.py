@@ -29,6 +29,14 @@ class Pace(Protocol):
         """Return the time of the run [s]: that of the step that is due now; 0 before the first."""
         ...
 
+    def moment(self) -> float:
+        """Return when an event happens that happens now [s]: between the step that is due and the next one."""
+        ...
+
+    def end(self) -> None:
+        """Note that no further step will come."""
+        ...
+
 
 def _go_on() -> None:
     """Do nothing: nothing asks the run to stop."""
@@ -50,6 +58,13 @@ class Unpaced:
     def time(self) -> float:
         """Return the time of the last step [s]."""
         return self._time
+
+    def moment(self) -> float:
+        """Return the time of the last step [s]."""
+        return self._time
+
+    def end(self) -> None:
+        """Do nothing: time goes by steps alone."""
 
     def now(self) -> float:
         """Return the performance counter [s]."""
@@ -85,10 +100,12 @@ class RealTime:
         self._clock = clock
         self._sleep = sleep
         self._start: float | None = None
+        self._due, self._ended = 0.0, False
 
     def wait(self, t: float) -> float:
         """Wait until the start plus ``t``; return the lateness [s]."""
         self._check()
+        self._due = t
         if self._start is None:
             self._start = self._clock() - t
         while (left := self._start + t - self._clock()) > 0.0:
@@ -106,3 +123,15 @@ class RealTime:
     def time(self) -> float:
         """Return the time since the start [s]; missed steps are not counted."""
         return 0.0 if self._start is None else self._clock() - self._start
+
+    def moment(self) -> float:
+        """Return the time since the start [s], in a step that takes too long that of the next one.
+
+        Steps that come after it begin no earlier, so events and steps stay in order. After the last step time is
+        not held back.
+        """
+        return self.time() if self._ended else min(self.time(), self._due + self._period)
+
+    def end(self) -> None:
+        """Note that no further step will come."""
+        self._ended = True

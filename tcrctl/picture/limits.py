@@ -136,7 +136,8 @@ def _beside(z: Array) -> tuple[Array, Array]:
     """Return what joints beside each say that it has moved along the body, and the largest that they have (n,) [m].
 
     Between two joints their mean, at an end the line through the next two; NaN where one of these is not known:
-    where cables end, one joint alone says little of the next. A joint that has moved by more than it can says no more.
+    where cables end, one joint alone says little of the next. A joint that has moved by more than it can says no
+    more.
     """
     n, nan = z.size, np.full(1, np.nan)
     z = np.clip(z, -GIVE, GIVE)

@@ -9,6 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
+from tcrctl.experiment.headline import numbers
+from tcrctl.experiment.spread import spread
 from tcrctl.plots import style
 from tcrctl.signals import Array
 
@@ -44,9 +46,8 @@ def draw(histories: Sequence[History]) -> Figure:
 
 
 def _draw(panel: Axes, index: int, history: History, error: Array, name: str, unit: str) -> None:
-    known = error[np.isfinite(error)]
-    label = f"{name}max {known.max():.3g} {unit}, rms {np.sqrt(np.mean(known**2)):.3g} {unit}"
-    panel.plot(history.t, error, **style.line(index), label=label)
+    said = numbers(spread(error, "max", "rms"), unit)
+    panel.plot(history.t, error, **style.line(index), label=f"{name}{said}")
 
 
 def _scale(panel: Axes) -> None:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
+from tcrctl.experiment.headline import number
 from tcrctl.plots import style
 from tcrctl.plots.cables import draw_cables
 
@@ -23,8 +24,9 @@ def draw(histories: Sequence[History]) -> Figure:
     for panel, values in zip(panels, shown, strict=True):
         style.limit(panel, values, bounds, "limit", "mm/s")
     if len(histories) == 1:
-        share = 100.0 * np.mean(histories[0].saturated.any(axis=1))
-        panels[0].set_title(f"saturated (x): {share:.3g} % of the steps", loc="left", fontsize=7)
+        share = 100.0 * float(np.mean(histories[0].saturated.any(axis=1)))
+        said = number(share, "% of the steps")
+        panels[0].set_title(f"at the speed limit (x): {said}", loc="left", fontsize=7)
     return figure
 
 

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
+from tcrctl.analysis.references import shared
 from tcrctl.signals import Array
 
 BLACK: Final = "#000000"
@@ -113,23 +114,17 @@ def compare(
     for i, (history, reached) in enumerate(zip(histories, actual, strict=True)):
         for panel, values in zip(panels, reached.T, strict=True):
             panel.plot(history.t, values, **line(i), label=_reached_label(histories, i))
-    for i, history in enumerate(histories):
-        if i and _same(wanted[0], wanted[i]):
-            continue
-        shared = all(_same(wanted[0], other) for other in wanted)
-        name = "wanted" if shared else f"wanted, {history.label}"
+    whole = shared(histories, wanted)
+    for i in range(len(histories)) if whole is None else (whole,):
+        name = "wanted" if whole is not None else f"wanted, {histories[i].label}"
+        colour = BLACK if whole is not None else line(i)["color"]
         for panel, values in zip(panels, wanted[i].T, strict=True):
             if np.isfinite(values).any():
-                colour = BLACK if shared else line(i)["color"]
-                panel.plot(history.t, values, color=colour, ls=(0, (2, 2)), lw=0.9, label=name)
+                panel.plot(histories[i].t, values, color=colour, ls=(0, (2, 2)), lw=0.9, label=name)
 
 
 def _reached_label(histories: Sequence[History], i: int) -> str:
     return "actual" if len(histories) == 1 else histories[i].label
-
-
-def _same(a: Array, b: Array) -> bool:
-    return a.shape == b.shape and bool(np.allclose(a, b, atol=1e-9, equal_nan=True))
 
 
 def legend(figure: Figure, panels: Sequence[Axes]) -> None:

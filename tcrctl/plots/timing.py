@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
+from tcrctl.experiment.headline import numbers
+from tcrctl.experiment.spread import spread
 from tcrctl.plots import style
 from tcrctl.signals import Array
 
@@ -33,16 +35,15 @@ def draw(histories: Sequence[History]) -> Figure:
 
 
 def _row(row: Sequence[Axes], histories: Sequence[History], values: Sequence[Array], name: str) -> None:
-    over_time, spread = row
+    over_time, often = row
     top = max(float(np.nanmax(v)) for v in values)
     edges = np.linspace(0.0, top or 1.0, _BINS + 1).tolist()
     for i, (history, found) in enumerate(zip(histories, values, strict=True)):
-        median, high = np.nanquantile(found, [0.5, 0.99])
         prefix = "" if len(histories) == 1 else f"{history.label}: "
-        label = f"{prefix}p50 {median:.3g}, p99 {high:.3g}, max {np.nanmax(found):.3g} ms"
+        label = f"{prefix}{numbers(spread(found, 'p50', 'p99', 'max'), 'ms')}"
         style_i = style.line(i)
         over_time.plot(history.t, found, lw=0.7, color=style_i["color"], label=label)
-        spread.hist(
+        often.hist(
             found,
             edges,
             orientation="horizontal",
@@ -53,4 +54,4 @@ def _row(row: Sequence[Axes], histories: Sequence[History], values: Sequence[Arr
     over_time.set(ylabel=name, ylim=(0.0, 1.08 * (top or 1.0)))
     style.span([over_time], histories)
     over_time.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1)
-    spread.set(ylim=over_time.get_ylim(), xscale="log")
+    often.set(ylim=over_time.get_ylim(), xscale="log")

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Final
 
 from tcrctl.config import strict_yaml
-from tcrctl.errors import InputError
+from tcrctl.errors import InputError, SpecError
+from tcrctl.experiment.plugged import Trust, validated, with_plugins
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, misfits
+from tcrctl.experiment.table_file import kept_name
 from tcrctl.log.file_names import RESOLVED, ROBOT, SPEC
 from tcrctl.log.reader import Log
 from tcrctl.log.run_files import RunFiles
 from tcrctl.robot.description import RobotDescription
+from tcrctl.trajectory.table_settings import TableSettings
 
 #: Sections that a replay can change: the others made what was recorded.
 CHANGEABLE: Final = ("controller", "estimator", "safety")
@@ -32,12 +35,14 @@ class Origin:
     wanted: LoadedSpec
 
 
-def rebuild(log: Log, overrides: Sequence[str]) -> Origin:
+def rebuild(log: Log, overrides: Sequence[str], plugins: Path | None = None) -> Origin:
     """Read experiment and robot from the attachments of a log.
 
     Args:
         log: The log.
         overrides: Assignments ``a.b=c`` that replace recorded settings.
+        plugins: Folder that holds the files of kinds from elsewhere; without it files and modules that a log names
+            are not run. What a log carries itself is never run.
 
     Raises:
         InputError: If the log has no such attachments, or an override changes what cannot be changed.
@@ -52,11 +57,12 @@ def rebuild(log: Log, overrides: Sequence[str]) -> Origin:
             raise InputError(
                 f"{log.path}: cannot be replayed: it has no attachment {name}; attachments: {has}"
             )
+    trust = Trust(plugins or Path(), files=plugins is not None, by_name=True)
     robot, document = files.robot(), files.document(RESOLVED)
-    recorded = _loaded(files, document, robot, ())
+    recorded = _loaded(files, document, robot, (), trust)
     for assignment in overrides:
         document = strict_yaml.override(document, assignment)
-    wanted = _loaded(files, document, robot, tuple(overrides)) if overrides else recorded
+    wanted = _loaded(files, document, robot, tuple(overrides), trust) if overrides else recorded
     if wanted.spec.controller.period_s != recorded.spec.controller.period_s:
         raise InputError("--set controller.period_s: a replay has the period with which was recorded")
     return Origin(recorded, wanted)
@@ -72,9 +78,19 @@ def _check_changeable(assignment: str) -> None:
 
 
 def _loaded(
-    files: RunFiles, document: strict_yaml.Document, robot: RobotDescription, overrides: tuple[str, ...]
+    files: RunFiles,
+    document: strict_yaml.Document,
+    robot: RobotDescription,
+    overrides: tuple[str, ...],
+    trust: Trust,
 ) -> LoadedSpec:
-    spec = strict_yaml.validate(document, ExperimentSpec)
+    model, problems = with_plugins(document, ExperimentSpec, trust)
+    if problems:
+        raise SpecError(problems)
+    spec = validated(document, model)
+    if isinstance(spec.trajectory, TableSettings):  # asked only if the controller looks at other instants
+        content = files.content(kept_name(spec.trajectory.file))
+        spec = spec.model_copy(update={"trajectory": spec.trajectory.with_content(content)})
     document.refuse(misfits(spec, robot))
     place = Path(files.place(""))
     return LoadedSpec(spec, robot, files.content(SPEC), place / SPEC, place / ROBOT, overrides)

@@ -17,6 +17,7 @@ import numpy as np
 from tcrctl.controller.controller import Controller, build_controller
 from tcrctl.errors import StoppedError
 from tcrctl.estimator.estimator import build_estimator
+from tcrctl.experiment.plugged import origins
 from tcrctl.experiment.prepare import Experiment, believed_drives, make_trajectory
 from tcrctl.log.checksums import checksums
 from tcrctl.log.comparison import Comparison, quantities
@@ -26,7 +27,7 @@ from tcrctl.loop.safety import NO_LIMITS, SafetyGuard
 from tcrctl.plant.recorded import Limits, Recorded, RecordingEndedError
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.plant.stroke import within_stroke
-from tcrctl.replay.environment import Change, changes
+from tcrctl.replay.environment import Change, changes, plugin_changes
 from tcrctl.replay.rebuild import Origin, rebuild
 from tcrctl.replay.recorded_picture import RecordedPicture
 from tcrctl.replay.replayed_log import open_replayed
@@ -59,13 +60,14 @@ def _silent(found: Sequence[Change]) -> None:
     """Say nothing."""
 
 
-def replay(
+def replay(  # noqa: PLR0913  # options of one verb, all but the first by name
     path: str | os.PathLike[str],
     *,
     overrides: Sequence[str] = (),
     window: Window = ALL_STEPS,
     tolerance: Tolerance = EXACT,
     out: Path | None = None,
+    plugins: Path | None = None,
     watch: Watch | None = None,
     announce: Announce = _silent,
     progress: Progress = _quiet,
@@ -78,6 +80,7 @@ def replay(
         window: Steps that are compared.
         tolerance: By bytes if left out.
         out: Log to be written with what was replayed.
+        plugins: Folder that holds the files of kinds from elsewhere; see :func:`tcrctl.replay.rebuild.rebuild`.
         watch: Takes every compared step, as recorded and as replayed.
         announce: Takes what differs from the recording machine, before the first step.
         progress: Takes the number of steps done, and their total if it is known.
@@ -87,9 +90,9 @@ def replay(
         LogError: If it is damaged inside, or ``out`` cannot be written.
     """
     log = read_log(path)
-    environment = changes(log)
+    origin = rebuild(log, overrides, plugins)
+    environment = (*changes(log), *plugin_changes(log, origins(origin.recorded.spec)))
     announce(environment)
-    origin = rebuild(log, overrides)
     work = _Replay(log, origin, window, tolerance, watch)
     begin = time.perf_counter()
     with ExitStack() as stack:

@@ -2,20 +2,12 @@
 const span = { from: DATA.begin, to: Math.max(DATA.end, DATA.begin + 1e-6) };
 const LEFT = 52, RIGHT = 8, TOP = 6, BOTTOM = 18;
 
-// Round numbers between two others, about as many as wanted.
-function ticks(low, high, count) {
-  const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough)), digit = rough / power;
-  const step = power * (digit < 1.5 ? 1 : digit < 3.5 ? 2 : digit < 7.5 ? 5 : 10), found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-  return [found, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))];
-}
-
 class Chart {
   constructor(parent, chart, onSpan) {
     this.chart = chart;
-    this.t = floats(DATA.t);
     this.lines = chart.lines.map((line) => floats(line.values));
-    this.marks = chart.marks && chart.marks.map((text) => unpack(text, Uint8Array));
+    this.times = chart.lines.map((line) => seriesTimes[line.run]);
+    this.marks = chart.lines.map((line) => line.marks && unpack(line.marks, Uint8Array));
     const element = parent.appendChild(document.createElement("div"));
     element.className = "chart";
     this.head = element.appendChild(document.createElement("header"));
@@ -27,9 +19,11 @@ class Chart {
     this.listen(onSpan);
   }
 
-  // "wanted" is always a dashed line in the colour of the text.
+  // "wanted" is a dashed line in the colour of the text, or of its run if runs wanted different things.
   look(i) {
-    return this.chart.lines[i].name === "wanted" ? [colour("ink"), [3, 3]] : [lineColour(i), DASHES[i % 4]];
+    const { wanted, look, name } = this.chart.lines[i];
+    if (wanted) return [name === "wanted" ? colour("ink") : lineColour(look), [3, 3]];
+    return [lineColour(look), DASHES[look % 4]];
   }
 
   makeLegend() {
@@ -45,10 +39,11 @@ class Chart {
   }
 
   range() {
-    const first = indexAt(this.t, span.from), last = indexAt(this.t, span.to);
     let low = Infinity, high = -Infinity;
-    for (const line of this.lines)
+    this.lines.forEach((line, k) => {
+      const first = indexAt(this.times[k], span.from), last = indexAt(this.times[k], span.to);
       for (let i = first; i <= last; i++) if (isFinite(line[i])) { low = Math.min(low, line[i]); high = Math.max(high, line[i]); }
+    });
     if (!isFinite(low)) [low, high] = [0, 1];
     const reach = Math.max(0.35 * (high - low), 0.1 * Math.max(Math.abs(low), Math.abs(high)));
     this.near = this.chart.limits.filter((limit) => limit.at >= low - reach && limit.at <= high + reach);
@@ -68,6 +63,7 @@ class Chart {
     this.digits = Math.min(4, Math.max(0, 4 - Math.floor(Math.log10(high - low))));
     this.drawGrid(c, low, high);
     c.save(); c.beginPath(); c.rect(LEFT, TOP - 2, width - LEFT - RIGHT, height - TOP - BOTTOM + 4); c.clip();
+    this.drawSpans(c);
     this.drawLimits(c);
     this.lines.forEach((line, i) => this.drawLine(c, line, i));
     c.restore();
@@ -79,9 +75,19 @@ class Chart {
     c.font = "11px system-ui, sans-serif"; c.lineWidth = 1; c.fillStyle = quiet; c.strokeStyle = grid;
     c.textAlign = "right"; c.textBaseline = "middle";
     const [rows, digits] = ticks(low, high, 4), [columns, decimals] = ticks(span.from, span.to, Math.max(3, this.width / 90));
-    for (const v of rows) { const y = this.y(v); c.beginPath(); c.moveTo(LEFT, y); c.lineTo(this.width - RIGHT, y); c.stroke(); c.fillText(v.toFixed(digits), LEFT - 6, y); }
+    for (const v of rows) { const y = this.y(v); c.beginPath(); c.moveTo(LEFT, y); c.lineTo(this.width - RIGHT, y); c.stroke(); c.fillText(fixed(v, digits), LEFT - 6, y, LEFT - 7); }
     c.textAlign = "center"; c.textBaseline = "top";
     for (const t of columns) { const x = this.x(t); c.beginPath(); c.moveTo(x, TOP); c.lineTo(x, this.height - BOTTOM); c.stroke(); c.fillText(t.toFixed(decimals) + " s", Math.min(x, this.width - 16), this.height - BOTTOM + 4); }
+  }
+
+  // Where the quantity is not defined.
+  drawSpans(c) {
+    c.font = "11px system-ui, sans-serif"; c.textAlign = "left"; c.textBaseline = "top";
+    for (const [from, to] of this.chart.spans) {
+      const x = this.x(from), wide = Math.max(2, this.x(to) - x);
+      c.fillStyle = colour("band"); c.globalAlpha = 0.45; c.fillRect(x, TOP, wide, this.height - TOP - BOTTOM); c.globalAlpha = 1;
+      if (wide > 150) { c.fillStyle = colour("quiet"); c.fillText("not defined: the end looks along x", x + 6, TOP + 3); }
+    }
   }
 
   drawLimits(c) {
@@ -95,28 +101,28 @@ class Chart {
   }
 
   drawLine(c, line, i) {
-    const [stroke, dash] = this.look(i), last = Math.min(this.t.length - 1, indexAt(this.t, span.to) + 1);
+    const [stroke, dash] = this.look(i), t = this.times[i], last = Math.min(t.length - 1, indexAt(t, span.to) + 1);
     c.strokeStyle = stroke; c.lineWidth = 1.4; c.setLineDash(dash); c.lineJoin = "round";
     c.beginPath();
     let pen = false;
-    for (let k = indexAt(this.t, span.from); k <= last; k++) {
+    for (let k = indexAt(t, span.from); k <= last; k++) {
       if (!isFinite(line[k])) { pen = false; continue; }
-      if (pen) c.lineTo(this.x(this.t[k]), this.y(line[k])); else c.moveTo(this.x(this.t[k]), this.y(line[k]));
+      if (pen) c.lineTo(this.x(t[k]), this.y(line[k])); else c.moveTo(this.x(t[k]), this.y(line[k]));
       pen = true;
     }
     c.stroke(); c.setLineDash([]);
-    if (!this.marks) return;
+    if (!this.marks[i]) return;
     c.strokeStyle = colour("ink"); c.lineWidth = 1; c.beginPath();
     for (let k = 0; k < line.length; k++) if (this.marks[i][k]) {
-      const x = this.x(this.t[k]), y = this.y(line[k]);
+      const x = this.x(t[k]), y = this.y(line[k]);
       c.moveTo(x - 2.5, y - 2.5); c.lineTo(x + 2.5, y + 2.5); c.moveTo(x - 2.5, y + 2.5); c.lineTo(x + 2.5, y - 2.5);
     }
     c.stroke();
   }
 
   drawCursor() {
-    const [c] = sharp(this.above), now = indexAt(this.t, clock.t), x = this.x(clock.t);
-    this.lines.forEach((line, i) => { this.values[i].textContent = isFinite(line[now]) ? line[now].toFixed(this.digits).replace("-", "−") : "–"; });
+    const [c] = sharp(this.above), x = this.x(clock.t), at = this.times.map((t) => indexAt(t, clock.t));
+    this.lines.forEach((line, i) => { const now = at[i]; this.values[i].textContent = isFinite(line[now]) ? fixed(line[now], this.digits) : "–"; });
     if (this.drag) {
       c.fillStyle = colour("accent"); c.globalAlpha = 0.18;
       c.fillRect(Math.min(...this.drag), TOP, Math.abs(this.drag[1] - this.drag[0]), this.height - TOP - BOTTOM);
@@ -127,6 +133,7 @@ class Chart {
     c.beginPath(); c.moveTo(x, TOP); c.lineTo(x, this.height - BOTTOM); c.stroke();
     c.globalAlpha = 1;
     this.lines.forEach((line, i) => {
+      const now = at[i];
       if (!isFinite(line[now])) return;
       c.fillStyle = this.look(i)[0];
       c.beginPath(); c.arc(x, this.y(line[now]), 2.8, 0, 7); c.fill();

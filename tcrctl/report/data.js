@@ -9,9 +9,11 @@ function unpack(text, kind) {
 }
 const floats = (text) => unpack(text, Float32Array);
 
-// Index of the last entry of the rising array that is not above the value.
+// Index of the last entry of the rising array that is not above the value; times are packed as float32, so that
+// 2.7 s as a double is before the step at 2.7 s unless it is rounded in the same way.
 function indexAt(rising, value) {
   let low = 0, high = rising.length - 1;
+  value = Math.fround(value);
   while (low < high) {
     const middle = (low + high + 1) >> 1;
     if (rising[middle] <= value) low = middle; else high = middle - 1;
@@ -55,3 +57,17 @@ function sharp(canvas) {
   context.clearRect(0, 0, width, height);
   return [context, width, height];
 }
+
+// Round numbers between two others, about as many as wanted.
+function ticks(low, high, count) {
+  const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough)), digit = rough / power;
+  const step = power * (digit < 1.5 ? 1 : digit < 3.5 ? 2 : digit < 7.5 ? 5 : 10), found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+  return [found, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))];
+}
+
+// Times of the points of every curve, by run.
+const seriesTimes = DATA.runs.map((run) => floats(run.t));
+
+// A number with so many decimals, a true minus, and no minus before zero.
+const fixed = (value, digits) => value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");

@@ -1,110 +1,135 @@
-"""The numbers of a page: time series and shapes, thinned out and packed.
-
-Arrays are little-endian and base64: float32 for series, 16-bit integers for shapes (about 0.02 mm each).
-"""
+"""The numbers of a page, for its scripts: curves, paths, shapes, task."""
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Iterator
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.analysis.history import History
+from tcrctl.analysis.pen import pen_down
+from tcrctl.analysis.plane import plane_of
+from tcrctl.analysis.references import shared
 from tcrctl.analysis.structure import read_structure
+from tcrctl.analysis.task_drawing import read_drawing
+from tcrctl.experiment.judgement import FINISHED
+from tcrctl.log.drawing import Drawing
+from tcrctl.report.charts import charts
+from tcrctl.report.packing import bundled_times, every, packed, raw
 from tcrctl.robot.module import NODES, module_count
 from tcrctl.signals import Array
 
-MOST_POINTS: Final = 4000
-"""Points per curve; of more, the smallest and the largest of every bundle are kept."""
 FRAME_RATE_HZ: Final = 20.0
 """Shapes per second; the page draws straight lines between them."""
 MOST_FRAMES: Final = 3000
 """Shapes in all."""
 _PATH_POINTS: Final = 1500
 
+Result = Mapping[str, Any]
 
-def payload(history: History) -> dict[str, Any]:
+
+def payload(histories: Sequence[History], results: Sequence[Result]) -> dict[str, Any]:
     """Return what the scripts of the page need; only text, numbers, lists and dicts.
 
     Args:
-        history: The run.
+        histories: One run, or several to compare.
+        results: Their objects of ``run --json``, or parts of them.
     """
-    t = history.t
-    path = _every(len(t), _PATH_POINTS)
+    drawings = [read_drawing(history.log) for history in histories]
+    plane = plane_of(histories, *(drawing.corners for drawing in drawings))
     return {
-        "t": _floats(bundled_times(t)),
-        "begin": float(t[0]),
-        "end": float(t[-1]),
-        "charts": list(_charts(history)),
-        "path": {
-            "t": _floats(t[path]),
-            "actual": _floats(history.position[path]),
-            "wanted": _floats(history.wanted_position[path]),
-            "wanted_normal": _floats(history.wanted_normal[path]) if history.tracks_orientation else None,
+        "begin": min(float(history.t[0]) for history in histories),
+        "end": max(float(history.t[-1]) for history in histories),
+        "open": _opening(histories[0], results[0]),
+        "plane": {
+            "right": plane.right.tolist(),
+            "up": plane.up.tolist(),
+            "name": plane.name,
+            "labels": plane.labels,
         },
-        "robot": _robot(history),
+        "shared_reference": shared(histories, [history.wanted_position for history in histories]),
+        "charts": list(charts(histories)),
+        "runs": [
+            _run(history, drawing, result)
+            for history, drawing, result in zip(histories, drawings, results, strict=True)
+        ],
     }
 
 
-def _charts(history: History) -> Iterator[dict[str, Any]]:
-    limits, cables = history.limits, history.cables
-    yield _chart("position error", "mm", {"error": 1e3 * history.position_error}, from_zero=True)
-    if history.tracks_orientation:
-        angle = np.degrees(history.orientation_error)
-        yield _chart("orientation error", "deg", {"error": angle}, from_zero=True)
-    for i, axis in enumerate("xyz"):
-        yield _pair(axis, "mm", 1e3 * history.position[:, i], 1e3 * history.wanted_position[:, i])
-    for i, axis in enumerate(("θx", "θy")):
-        yield _pair(axis, "deg", np.degrees(history.angles[:, i]), np.degrees(history.wanted_angles[:, i]))
-    drive, speed = 1e3 * history.drive, 1e3 * history.speed
-    stroke = [1e3 * end for end in limits.stroke or ()]
-    yield _chart("drive", "mm", _named(cables, drive), limits=[("stroke", at) for at in stroke])
-    bound = [] if limits.speed is None else [-1e3 * limits.speed, 1e3 * limits.speed]
-    yield _chart(
-        "drive speed",
-        "mm/s",
-        _named(cables, speed),
-        limits=[("limit", at) for at in bound],
-        marks=history.saturated,
-    )
-    known = [("floor", limits.floor), ("ceiling", limits.ceiling), ("limit", limits.tension)]
-    yield _chart(
-        "tension", "N", _named(cables, history.tension), limits=[(n, at) for n, at in known if at is not None]
-    )
-    yield _chart("control time", "ms", {"estimator and controller": 1e3 * history.compute}, from_zero=True)
+def _opening(history: History, result: Result) -> float:
+    """Return the time at which the page opens: the stop, the last thing that the task was about, or the end."""
+    if result.get("status") in FINISHED:
+        told = [
+            e.t for e in history.log.events() if e.kind == "task" and history.t[0] <= e.t <= history.t[-1]
+        ]
+        if told:
+            return max(told)
+    return float(history.t[-1])
 
 
-def _named(cables: tuple[str, ...], values: Array) -> dict[str, Array]:
-    return dict(zip(cables, values.T, strict=True))
-
-
-def _pair(name: str, unit: str, actual: Array, wanted: Array) -> dict[str, Any]:
-    lines = {"actual": actual, **({"wanted": wanted} if np.isfinite(wanted).any() else {})}
-    return _chart(name, unit, lines)
-
-
-def _chart(
-    name: str,
-    unit: str,
-    lines: dict[str, Array],
-    *,
-    limits: list[tuple[str, float]] | None = None,
-    marks: NDArray[np.bool_] | None = None,
-    from_zero: bool = False,
-) -> dict[str, Any]:
+def _run(history: History, drawing: Drawing, result: Result) -> dict[str, Any]:
+    path = every(len(history.t), _PATH_POINTS)
+    normal = packed(history.wanted_normal[path]) if history.tracks_orientation else None
     return {
-        "name": name,
-        "unit": unit,
-        "lines": [{"name": label, "values": _floats(bundled(values))} for label, values in lines.items()],
-        "limits": [{"name": label, "at": at} for label, at in limits or ()],
-        "marks": None
-        if marks is None
-        else [_bytes(bundled_marks(mark).astype(np.uint8)) for mark in marks.T],
-        "from_zero": from_zero,
+        "label": history.label,
+        "t": packed(bundled_times(history.t)),
+        "path": {
+            "t": packed(history.t[path]),
+            "actual": packed(history.position[path]),
+            "wanted": packed(history.wanted_position[path]),
+            "wanted_normal": normal,
+            "drawn": raw(pen_down(history)[path].astype(np.uint8)),
+        },
+        "events": [
+            {"t": e.t, "level": e.level, "said": e.message}
+            for e in history.log.events()
+            if math.isfinite(e.t)
+        ],
+        "robot": _robot(history),
+        "task": _task(drawing, result),
     }
+
+
+def _task(drawing: Drawing, result: Result) -> dict[str, Any]:
+    sight = drawing.sight
+    seen = _first_seen(result.get("task"))
+    return {
+        "outlines": [
+            {"kind": outline.kind, "label": outline.label, "points": packed(outline.points)}
+            for outline in drawing.outlines
+        ],
+        "balls": [
+            {"name": b.name, "centre": b.centre.tolist(), "radius": b.radius, "seen": seen.get(b.name)}
+            for b in drawing.balls
+        ],
+        "passages": [
+            {
+                "entry": p.entry.tolist(),
+                "axis": p.axis.tolist(),
+                "length": p.length,
+                "radius": p.radius,
+                "screen": p.screen,
+            }
+            for p in drawing.passages
+        ],
+        "sight": None
+        if sight is None
+        else {"ahead": sight.ahead, "half_angle": sight.half_angle, "reach": sight.reach},
+    }
+
+
+def _first_seen(task: Any) -> dict[str, float]:
+    """Return when each object was first seen [s], by name; others may have written the log."""
+    items = task.get("objects") if isinstance(task, Mapping) else None
+    found = {}
+    for item in items if isinstance(items, list) else ():
+        at = item.get("first_seen_s") if isinstance(item, Mapping) else None
+        if isinstance(at, int | float) and math.isfinite(at):
+            found[str(item.get("name"))] = float(at)
+    return found
 
 
 def _robot(history: History) -> dict[str, Any] | None:
@@ -115,24 +140,19 @@ def _robot(history: History) -> dict[str, Any] | None:
     nodes = history.shape[frames]
     middle, scale = _grid(nodes)
     structure = read_structure(history.log, nodes.shape[1])
+    cables = () if structure is None else structure.cables
     return {
-        "t": _floats(history.t[history.shape_step[frames]]),
+        "t": packed(history.t[history.shape_step[frames]]),
         "count": nodes.shape[1],
         "per_module": NODES,
-        "nodes": _bytes(np.round((nodes - middle) / scale).astype("<i2")),
+        "nodes": raw(np.round((nodes - middle) / scale).astype("<i2")),
         "middle": middle.tolist(),
         "scale": scale,
         "tip": module_count(nodes.shape[1]) if structure is None else structure.tip_ring,
         "springs": [] if structure is None else structure.springs.tolist(),
-        "cables": []
-        if structure is None
-        else [
-            {
-                "name": cable.name,
-                "nodes": cable.nodes.tolist(),
-                "weights": np.round(cable.weights, 6).tolist(),
-            }
-            for cable in structure.cables
+        "cables": [
+            {"name": c.name, "nodes": c.nodes.tolist(), "weights": np.round(c.weights, 6).tolist()}
+            for c in cables
         ],
     }
 
@@ -141,65 +161,10 @@ def _frames(history: History) -> NDArray[np.int64]:
     """Return the rows of ``history.shape`` that are shown."""
     t = history.t[history.shape_step]
     wanted = int(FRAME_RATE_HZ * (t[-1] - t[0])) + 1
-    return _every(len(t), min(MOST_FRAMES, max(wanted, 2)))
+    return every(len(t), min(MOST_FRAMES, max(wanted, 2)))
 
 
 def _grid(nodes: Array) -> tuple[Array, float]:
     """Return the middle and step of a grid of 16-bit integers that holds all nodes."""
     low, high = nodes.min(axis=(0, 1)), nodes.max(axis=(0, 1))
     return (low + high) / 2.0, max(float(np.max(high - low)), 1e-6) / 65530.0
-
-
-def _every(count: int, most: int) -> NDArray[np.int64]:
-    """Return at most ``most`` of ``count`` rows, equally far apart, first and last among them."""
-    return np.unique(np.round(np.linspace(0, count - 1, min(count, most))).astype(np.int64))
-
-
-def _bundles(count: int) -> tuple[int, int]:
-    """Return the number of bundles and points in each, so that two per bundle are at most ``MOST_POINTS``."""
-    size = -(-2 * count // MOST_POINTS)
-    return count // size, size
-
-
-def bundled(values: Array) -> Array:
-    """Thin out a curve so that no peak is lost.
-
-    Args:
-        values: (n,), may hold NaN.
-
-    Returns:
-        ``values`` if they are few; else smallest and largest of every bundle, in the order in which they come. A
-        rest smaller than a bundle at the end is left out.
-    """
-    if len(values) <= MOST_POINTS:
-        return values
-    count, size = _bundles(len(values))
-    rows = values[: count * size].reshape(count, size)
-    known = np.where(np.isfinite(rows), rows, 0.0)
-    ends = np.sort(np.stack([known.argmin(axis=1), known.argmax(axis=1)], axis=1), axis=1)
-    return np.take_along_axis(rows, ends, axis=1).ravel()
-
-
-def bundled_times(t: Array) -> Array:
-    """Return times (k,) of the points that :func:`bundled` keeps: the first and the middle of every bundle."""
-    if len(t) <= MOST_POINTS:
-        return t
-    count, size = _bundles(len(t))
-    rows = t[: count * size].reshape(count, size)
-    return rows[:, [0, size // 2]].ravel()
-
-
-def bundled_marks(marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return marks (k,) of the points that :func:`bundled` keeps: set where any point of the bundle is marked."""
-    if len(marks) <= MOST_POINTS:
-        return marks
-    count, size = _bundles(len(marks))
-    return np.repeat(marks[: count * size].reshape(count, size).any(axis=1), 2)
-
-
-def _floats(values: Array) -> str:
-    return _bytes(np.ascontiguousarray(values, dtype="<f4"))
-
-
-def _bytes(values: NDArray[Any]) -> str:
-    return base64.b64encode(values.tobytes()).decode("ascii")

@@ -1,10 +1,4 @@
-// The robot in space: rods, rings, springs, cables by tension; wanted and actual path of its end.
-const add = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const scaled = (a, s) => [s * a[0], s * a[1], s * a[2]];
-const unit = (a) => scaled(a, 1 / (Math.hypot(...a) || 1));
-
+// The robot in space: rods, rings, springs, cables by tension; wanted and actual path of its end; its task.
 // Blue is slack, vermilion the largest tension of the run.
 function tensionColour(share) {
   const stops = isDark() ? [[86, 180, 233], [240, 228, 66], [255, 110, 60]] : [[0, 114, 178], [214, 160, 0], [205, 60, 0]];
@@ -15,17 +9,20 @@ function tensionColour(share) {
 class RobotView {
   constructor(canvas) {
     this.canvas = canvas;
-    const robot = DATA.robot, path = DATA.path;
+    this.index = +canvas.dataset.run;
+    this.run = DATA.runs[this.index];
+    this.end = null;
+    const { robot, path } = this.run;
     this.path = { t: floats(path.t), actual: floats(path.actual), wanted: floats(path.wanted),
       normal: path.wanted_normal && floats(path.wanted_normal) };
     if (robot) {
       this.frameT = floats(robot.t);
       this.frames = unpack(robot.nodes, Int16Array);
-      const chart = DATA.charts.find((c) => c.name === "tension");
+      const chart = DATA.charts.find((c) => c.shows === "tension" && c.run === this.index);
       this.tension = chart.lines.map((line) => floats(line.values));
-      this.fullScale = Math.max(1, ...this.tension.map((values) => values.reduce((a, b) => (b > a ? b : a), 0)));
+      this.most = Math.max(1, ...this.tension.map((values) => values.reduce((a, b) => (b > a ? b : a), 0)));
     }
-    this.seriesT = floats(DATA.t);
+    this.seriesT = floats(this.run.t);
     this.box = this.bounds();
     this.look("space");
     this.listen();
@@ -36,13 +33,14 @@ class RobotView {
     const take = (p) => { for (let k = 0; k < 3; k++) if (isFinite(p[k])) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); } };
     for (const line of [this.path.actual, this.path.wanted])
       for (let i = 0; i < line.length; i += 3) take([line[i], line[i + 1], line[i + 2]]);
-    if (DATA.robot) for (const i of [0, this.frameT.length >> 1, this.frameT.length - 1]) this.nodesAt(this.frameT[i]).forEach(take);
+    taskCorners(this.run.task).forEach(take);
+    if (this.run.robot) for (const i of [0, this.frameT.length >> 1, this.frameT.length - 1]) this.nodesAt(this.frameT[i]).forEach(take);
     return { low, high, middle: low.map((v, k) => (v + high[k]) / 2), size: Math.max(...high.map((v, k) => v - low[k]), 0.05) };
   }
 
   look(view) {
     const [azimuth, elevation] = { space: [-0.9, 0.28], front: [-Math.PI / 2, 0], side: [0, 0], above: [-Math.PI / 2, Math.PI / 2 - 1e-4], end: [-0.9, 0.28] }[view];
-    Object.assign(this, { azimuth, elevation, zoom: 1, target: this.box.middle });
+    Object.assign(this, { azimuth, elevation, zoom: 1, target: this.box.middle, view });
     this.fit();
     if (view === "end") {
       const a = this.path.actual, low = [0, 1, 2].map((k) => Infinity), high = [0, 1, 2].map((k) => -Infinity);
@@ -62,7 +60,7 @@ class RobotView {
       most[1] = Math.max(most[1], Math.abs(dot(d, up)));
     }
     const { clientWidth, clientHeight } = this.canvas;
-    this.whole = 0.4 * Math.min(clientWidth / most[0], clientHeight / most[1], 4 * Math.max(clientWidth, clientHeight) / this.box.size);
+    this.whole = 0.41 * Math.min(clientWidth / most[0], clientHeight / most[1], 4 * Math.max(clientWidth, clientHeight) / this.box.size);
   }
 
   // Towards the viewer, to the right, and up.
@@ -74,7 +72,7 @@ class RobotView {
 
   // Node positions [m] at a time, on the straight line between two frames.
   nodesAt(t) {
-    const robot = DATA.robot, i = indexAt(this.frameT, t), j = Math.min(i + 1, this.frameT.length - 1);
+    const robot = this.run.robot, i = indexAt(this.frameT, t), j = Math.min(i + 1, this.frameT.length - 1);
     const span = this.frameT[j] - this.frameT[i], s = span > 0 ? Math.min(1, Math.max(0, (t - this.frameT[i]) / span)) : 0;
     const nodes = [], f = this.frames, at = 3 * robot.count;
     for (let n = 0; n < robot.count; n++)
@@ -94,7 +92,8 @@ class RobotView {
     this.segments = [];
     this.drawGround(c);
     this.drawPath(c);
-    if (DATA.robot) this.drawRobot(c);
+    if (this.run.robot) this.drawRobot(c);
+    new TaskView(c, this.project, right).draw(this.run.task, clock.t, this.end);
     this.drawAxes(c, height);
   }
 
@@ -140,15 +139,15 @@ class RobotView {
 
   drawPath(c) {
     const { t, actual, wanted, normal } = this.path, now = indexAt(t, clock.t);
-    c.lineWidth = 1.4; c.strokeStyle = colour("quiet"); c.setLineDash([3, 4]);
+    c.lineWidth = 4; c.strokeStyle = colour("band"); c.lineCap = "round";
     this.trace(c, wanted, t.length);
-    c.setLineDash([]); c.lineWidth = 2; c.strokeStyle = lineColour(0);
+    c.lineCap = "butt"; c.lineWidth = 1.6; c.strokeStyle = lineColour(this.index); c.globalAlpha = 0.35;
+    this.trace(c, actual, t.length);
+    c.globalAlpha = 1;
     this.trace(c, actual, now + 1);
     const at = [0, 1, 2].map((k) => wanted[3 * now + k]);
     if (!at.every(isFinite)) return;
-    const [x, y] = this.project(at);
-    c.strokeStyle = colour("ink"); c.lineWidth = 1.3;
-    c.beginPath(); c.moveTo(x - 6, y); c.lineTo(x + 6, y); c.moveTo(x, y - 6); c.lineTo(x, y + 6); c.stroke();
+    cross2d(c, ...this.project(at));
     if (normal && isFinite(normal[3 * now])) this.arrow(c, at, [0, 1, 2].map((k) => -normal[3 * now + k]), colour("ink"), [4, 3]);
   }
 
@@ -162,7 +161,7 @@ class RobotView {
   }
 
   drawRobot(c) {
-    const robot = DATA.robot, nodes = this.nodesAt(clock.t), body = colour("robot"), tip = colour("tip");
+    const robot = this.run.robot, nodes = this.nodesAt(clock.t), body = colour("robot"), tip = colour("tip");
     const thick = Math.min(4, Math.max(1, this.pixels * 0.004));
     const per = robot.per_module;
     let end = null;
@@ -173,17 +172,18 @@ class RobotView {
       const on = (k) => add(add(centre, arm, Math.cos((2 * Math.PI * k) / around)), across, Math.sin((2 * Math.PI * k) / around));
       for (let k = 0; k < around; k++) this.line(on(k), on(k + 1), isTip ? tip : body, isTip ? 1.6 * thick : 1.2 * thick);
       for (const node of [a, b, d]) this.line(node, apex, isTip ? tip : body, thick);
-      if (isTip) end = [centre, unit(cross(add(b, a, -1), add(d, b, -1)))];
+      if (isTip) end = { at: centre, normal: unit(cross(add(b, a, -1), add(d, b, -1))) };
     }
     this.drawSprings(nodes);
     this.drawCables(nodes, thick);
     this.flush(c);
-    if (end) this.arrow(c, end[0], scaled(end[1], -1), tip);
+    this.end = end;
+    if (end && !this.run.task.sight) this.arrow(c, end.at, scaled(end.normal, -1), tip);
   }
 
   drawSprings(nodes) {
     const stroke = colour("spring"), turns = 8;
-    for (const [i, j] of DATA.robot.springs) {
+    for (const [i, j] of this.run.robot.springs) {
       const a = nodes[i], along = add(nodes[j], a, -1), side = scaled(unit(cross(along, Math.abs(along[2]) < Math.abs(along[0]) ? [0, 0, 1] : [1, 0, 0])), 0.002);
       let last = a;
       for (let k = 1; k <= turns; k++) {
@@ -196,8 +196,8 @@ class RobotView {
 
   drawCables(nodes, thick) {
     const now = indexAt(this.seriesT, clock.t);
-    DATA.robot.cables.forEach((cable, index) => {
-      const newton = this.tension[index] ? this.tension[index][now] : 0, stroke = tensionColour(newton / this.fullScale);
+    this.run.robot.cables.forEach((cable, index) => {
+      const newton = this.tension[index] ? this.tension[index][now] : 0, stroke = tensionColour(newton / fullScale());
       const points = cable.nodes.map((rows, hole) => rows.reduce((p, row, k) => add(p, nodes[row], cable.weights[hole][k]), [0, 0, 0]));
       for (let k = 1; k < points.length; k++) this.line(points[k - 1], points[k], stroke, Math.max(1.3, 0.8 * thick));
     });
@@ -235,6 +235,13 @@ class RobotView {
         this.elevation = Math.min(1.57, Math.max(-1.57, this.elevation + 0.008 * dy));
       }
       this.draw();
+    });
+    this.canvas.addEventListener("keydown", (e) => {
+      const turn = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[e.key], zoom = { "+": 1.15, "-": 1 / 1.15 }[e.key];
+      if (turn) { this.azimuth += 0.12 * turn[0]; this.elevation = Math.min(1.57, Math.max(-1.57, this.elevation + 0.12 * turn[1])); }
+      else if (zoom) this.zoom = Math.min(60, Math.max(0.3, this.zoom * zoom));
+      else return;
+      e.preventDefault(); e.stopPropagation(); this.draw();
     });
     this.canvas.addEventListener("wheel", (e) => { e.preventDefault(); this.zoom = Math.min(60, Math.max(0.3, this.zoom * Math.exp(-0.0015 * e.deltaY))); this.draw(); }, { passive: false });
   }

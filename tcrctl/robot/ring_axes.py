@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
+from tcrctl.numerics.rotation import cross, norm
 from tcrctl.robot.module import RING
 from tcrctl.signals import Array
 
@@ -16,3 +18,15 @@ def ring_frames(nodes: Array) -> Array:
     z = np.cross(x, rings[:, 2] - rings[:, 0])
     z = z / np.linalg.norm(z, axis=1, keepdims=True)
     return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+@njit(cache=True)
+def axes_of(ring: Array) -> Array:
+    """Return those of one ring (3, 3), one per row, from its nodes (3, 3): the same as a kernel."""
+    side = ring[1] - ring[0]
+    normal = cross(side, ring[2] - ring[0])
+    axes = np.empty((3, 3))
+    axes[0] = side / norm(side)
+    axes[2] = normal / norm(normal)
+    axes[1] = cross(axes[2], axes[0])
+    return axes

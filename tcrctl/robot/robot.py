@@ -73,6 +73,11 @@ class Robot:
         """End normal at rest (3,)."""
         return pose.normal(self.rest.q, self.tip)
 
+    @property
+    def rest_gain(self) -> Array:
+        """Derivatives (7, m) of end position [m/m], normal and twist [1/m] by the drives, at rest."""
+        return pose.drive_gain(self.rest.q, self.rest.gain, self.tip)
+
 
 def _strung(d: RobotDescription, start: Array) -> tuple[Model, Array, Equilibrium]:
     """Find the rest lengths: given ones, or those that give every cable its tension at zero drive."""

@@ -17,13 +17,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+from tcrctl.experiment.plugged import origins
 from tcrctl.experiment.spec import LoadedSpec, with_draws
+from tcrctl.experiment.table_file import table_file
 
 _PACKAGE: Final = Path(__file__).parents[1]
 #: Parts of the program that stand above experiments, or beside them: they cannot change a number.
 ABOVE: Final = (
-    "analysis", "caches", "cli", "commissioning", "emulate", "executors", "identify", "paper", "plots", "replay",
-    "report", "stability", "study", "tune", "view", "workspace",
+    "analysis", "api", "caches", "cli", "commissioning", "emulate", "executors", "extend", "identify", "paper",
+    "plots", "replay", "report", "stability", "study", "tune", "view", "workspace",
 )  # fmt: skip
 #: Packages that kernels and numbers are made with.
 _NUMERIC: Final = ("llvmlite", "numba", "numpy", "scipy")
@@ -46,6 +48,8 @@ def address(loaded: LoadedSpec, seed: int, *, random_path: bool) -> str:
         "spec": {key: value for key, value in spec.items() if key not in _WORDS},
         "robot": loaded.robot.model_dump(mode="json"),
         "plant_robot": loaded.plant_robot and loaded.plant_robot.model_dump(mode="json"),
+        "files": [origin.sha256 for origin in origins(loaded.spec)],
+        "samples": [hashlib.sha256(data).hexdigest() for data in table_file(loaded.spec.trajectory).values()],
         "random_path": random_path,
         "program": program(),
     }
@@ -69,5 +73,5 @@ def _sources() -> Iterator[tuple[str, bytes]]:
     for root in roots:
         for path in sorted(root.rglob("*.py")):
             place = path.relative_to(root)
-            if root != _PACKAGE or place.parts[0] not in ABOVE:
+            if root != _PACKAGE or place.parts[0].removesuffix(".py") not in ABOVE:
                 yield f"{root.name}/{place.as_posix()}", path.read_bytes()

@@ -8,10 +8,12 @@ from typing import Any, Final, NamedTuple, Protocol
 import numpy as np
 
 from tcrctl.config.settings import Settings
+from tcrctl.log.drawing import Drawing
 from tcrctl.log.event import Event
 from tcrctl.signals import Array, StepRecord
 from tcrctl.task.box import hole_targets
 from tcrctl.task.box_inspection import build_box_inspection
+from tcrctl.task.drawing import box_drawing, pipe_drawing
 from tcrctl.task.laser_pipe import build_laser_pipe
 from tcrctl.task.pipe import Seen, pipe_targets
 from tcrctl.task.settings import BoxInspectionSettings, LaserPipeSettings, TaskSettings
@@ -40,17 +42,19 @@ class Kind(NamedTuple):
         settings: Its section.
         build: Makes the task from its section, its targets and the diameter of the robot's rods [m].
         targets: Finds the named poses from the section and how its markers are seen.
+        drawing: What pictures show of it.
     """
 
     settings: type[Settings]
     build: Callable[[Any, Mapping[str, EndPose], float], Task]
     targets: Callable[[Any, Seen], Mapping[str, EndPose]]
+    drawing: Callable[[Any], Drawing]
 
 
 #: Every ``task.kind``.
 KINDS: Final[Mapping[str, Kind]] = {
-    "laser_pipe": Kind(LaserPipeSettings, build_laser_pipe, pipe_targets),
-    "box_inspection": Kind(BoxInspectionSettings, build_box_inspection, hole_targets),
+    "laser_pipe": Kind(LaserPipeSettings, build_laser_pipe, pipe_targets, pipe_drawing),
+    "box_inspection": Kind(BoxInspectionSettings, build_box_inspection, hole_targets, box_drawing),
 }
 
 
@@ -63,6 +67,11 @@ def task_targets(settings: TaskSettings, seed: int) -> Mapping[str, EndPose]:
     """
     kind = KINDS[settings.kind]
     return kind.targets(settings, _noisy(MM * 1e-3 * settings.marker_noise_um, seed))
+
+
+def task_drawing(settings: TaskSettings | None) -> Drawing:
+    """Return what pictures show of a task; of none, nothing."""
+    return Drawing() if settings is None else KINDS[settings.kind].drawing(settings)
 
 
 def build_task(settings: TaskSettings, seed: int, rod_diameter: float) -> Task:

@@ -12,6 +12,7 @@ from tcrctl.trajectory.drive_settings import DrivesSettings
 from tcrctl.trajectory.excitation_settings import ExcitationSettings
 from tcrctl.trajectory.pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
 from tcrctl.trajectory.section import TrajectorySection
+from tcrctl.trajectory.table_settings import TableSettings
 from tcrctl.trajectory.values import NotNegative, Positive, Vector, check_one_of, not_empty
 
 JOIN_TOLERANCE_MM = 1e-6
@@ -175,7 +176,8 @@ TrajectorySettings: TypeAlias = Annotated[
     | RevolutionSettings
     | ScanSettings
     | DrivesSettings
-    | ExcitationSettings,
+    | ExcitationSettings
+    | TableSettings,
     Field(discriminator="kind"),
 ]
 """Union of all kinds of trajectory, told apart by ``kind``; see :data:`tcrctl.trajectory.trajectory.KINDS`."""

@@ -7,6 +7,7 @@ from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
+from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Reference
 from tcrctl.trajectory.drive_settings import DrivesSettings
@@ -14,12 +15,15 @@ from tcrctl.trajectory.drives import build_drives
 from tcrctl.trajectory.excitation import build_excitation
 from tcrctl.trajectory.excitation_settings import ExcitationSettings
 from tcrctl.trajectory.hold import build_hold
+from tcrctl.trajectory.own import OwnTrajectory
 from tcrctl.trajectory.pose_settings import RevolutionSettings, ScanSettings, WaypointsSettings
 from tcrctl.trajectory.revolution import build_revolution
 from tcrctl.trajectory.scan import build_scan
 from tcrctl.trajectory.section import TrajectorySection
 from tcrctl.trajectory.settings import HoldSettings, StrokesSettings, TrajectorySettings
 from tcrctl.trajectory.strokes import build_strokes
+from tcrctl.trajectory.table import build_table
+from tcrctl.trajectory.table_settings import TableSettings
 from tcrctl.trajectory.targets import Targets, with_targets
 from tcrctl.trajectory.waypoints import build_waypoints
 
@@ -59,6 +63,7 @@ KINDS: Final[Mapping[str, tuple[type[TrajectorySection], Callable[[Any, Robot], 
     "scan": (ScanSettings, build_scan),
     "drives": (DrivesSettings, build_drives),
     "excitation": (ExcitationSettings, build_excitation),
+    "table": (TableSettings, build_table),
 }
 
 NO_TARGETS: Targets = {}
@@ -74,7 +79,11 @@ def build_trajectory(settings: TrajectorySettings, robot: Robot, targets: Target
 
     Raises:
         NoEquilibriumError: If drive lengths are given with which the robot has no stable shape.
+        InputError: If one from elsewhere cannot be built.
     """
+    plugin = plugin_of(settings)
+    if plugin is not None:
+        return OwnTrajectory(with_targets(settings, targets), plugin, robot)
     _, build = KINDS[settings.kind]
     return build(with_targets(settings, targets), robot)
 

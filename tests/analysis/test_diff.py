@@ -38,6 +38,7 @@ def a(tmp_path):
     return write(tmp_path / "a.mcap")
 
 
+@pytest.mark.slow
 def test_a_log_is_the_same_as_itself_and_as_another_of_the_same_bits(a, tmp_path, capsys):
     assert diff(a, a).same
     again = write(tmp_path / "b.mcap", versions={**VERSIONS, "numpy": "2.2.0"})

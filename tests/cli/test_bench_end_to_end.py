@@ -16,6 +16,7 @@ from support.loopback import patient_rig
 from support.short_runs import ROOT, SHORT, arguments
 from tcrctl.cli.app import main
 from tcrctl.config import strict_yaml
+from tcrctl.controller.shell import Shell
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.spec import load_spec
@@ -109,13 +110,17 @@ def test_a_signal_stops_the_drives_before_the_program_ends(experiment, tmp_path)
     assert events[-1].startswith("stopping -> disarmed: standstill")
 
 
-def test_a_fault_of_the_program_stops_the_drives_too(experiment, tmp_path):
-    def broken(done, total):
-        if done == 10:
-            raise ZeroDivisionError("a bug")
+def test_a_fault_of_the_program_stops_the_drives_too(experiment, tmp_path, monkeypatch):
+    control = Shell.control
 
+    def broken(controller, estimate, reference):
+        if estimate.t > 0.5:
+            raise ZeroDivisionError("a bug")
+        return control(controller, estimate, reference)
+
+    monkeypatch.setattr(Shell, "control", broken)
     with pytest.raises(ZeroDivisionError):
-        run_experiment(experiment, out=tmp_path, confirmed=True, progress=broken)
+        run_experiment(experiment, out=tmp_path, confirmed=True)
     (path,) = tmp_path.glob("*/log.mcap")
     events = [event.message for event in read_log(path).events() if event.kind == "supervisor"]
     assert events[-1].startswith("stopping -> disarmed: standstill")

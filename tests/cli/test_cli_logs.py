@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import sys
 
@@ -16,12 +17,14 @@ from support.log_files import open_log
 from support.log_mutants import starts
 from tcrctl.analysis.export import export_csv, export_parquet
 from tcrctl.analysis.info import inspect
+from tcrctl.analysis.result import run_result
 from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.recover import recover
 from tcrctl.errors import InputError, LogError, TcrctlError
 from tcrctl.log.columns import COLUMNS, meanings
 from tcrctl.log.reader import read_log
+from tcrctl.signals import Timing
 
 N_STEPS = 50
 SUMMARY = {
@@ -80,7 +83,8 @@ def cut(log, tmp_path):
 def test_info_says_what_was_logged(log):
     code, out, _ = tcrctl("info", log, "--json")
     found = json.loads(out)
-    control = [1e3 * records.record(k).timing.control for k in range(N_STEPS)]
+    timings = [records.record(k).timing for k in range(N_STEPS)]
+    control = [1e3 * (timing.estimate + timing.control) for timing in timings]
     assert code == 0
     assert (found["status"], found["reason"], found["complete"]) == ("failed", "a criterion failed", True)
     assert (found["steps"], found["lost_steps"], found["overruns"]) == (N_STEPS, 0, 0)
@@ -122,6 +126,73 @@ def test_info_measures_jitter_lateness_and_lost_steps(tmp_path):
     assert found.lateness_ms is not None
     assert found.jitter_ms.max == pytest.approx(4.0)
     assert found.lateness_ms.max == pytest.approx(104.0)
+
+
+def paced_log(path, lateness, status="success", busy=0.0):
+    """A log whose steps began so late, as a run that the clock paces writes it."""
+    start = {**records.START, "realtime": "true"}
+    with open_log(path, start=start) as writer:
+        for k, late in enumerate(lateness):
+            timing = Timing(busy, 0.002, 0.003, 0.0, late)
+            writer.step(dataclasses.replace(records.record(k), timing=timing))
+        writer.finish({**STOP, "status": status})
+    return path
+
+
+@pytest.mark.parametrize("stopped_s", [0.12, 9.0])
+def test_info_tells_the_time_that_a_paced_run_took_by_the_clock(tmp_path, stopped_s):
+    """Its steps' own time leaves out what was missed."""
+    lateness = np.full(N_STEPS, 0.0002)
+    lateness[10] = stopped_s
+    found = inspect(paced_log(tmp_path / "log.mcap", lateness))
+    nominal = N_STEPS * records.PERIOD_S
+    assert found.duration_s == pytest.approx(nominal + stopped_s)
+    assert found.rate_hz == pytest.approx((N_STEPS - 1) / (nominal - records.PERIOD_S + stopped_s), rel=1e-6)
+    assert found.jitter_ms.max == pytest.approx(1e3 * stopped_s, rel=0.01)
+    assert found.jitter_ms.p50 == pytest.approx(0.0, abs=1e-9)
+    assert found.period_s == pytest.approx(records.PERIOD_S)
+    assert found.control_ms.p50 == pytest.approx(5.0)
+    assert found.overruns == 1
+
+
+def test_info_tells_the_period_that_a_computer_kept_which_does_not_keep_up(tmp_path):
+    lateness = np.tile([0.02, 0.04, 0.06], 20)[:N_STEPS]  # every step takes 70 ms instead of 50
+    found = inspect(paced_log(tmp_path / "log.mcap", lateness, busy=0.065))
+    assert found.period_s == pytest.approx(0.07)
+    assert found.rate_hz == pytest.approx(1 / 0.07, rel=0.02)
+    assert found.overruns == N_STEPS
+    assert "100 %" in tcrctl("info", found.path)[1]
+
+
+def test_a_run_that_no_clock_paced_has_no_jitter_to_tell(log):
+    assert "no clock paced the run" in tcrctl("info", log)[1]
+
+
+@pytest.mark.parametrize("status", ["aborted", "error"])
+def test_criteria_of_a_stopped_run_are_not_passed(tmp_path, status):
+    """Also in logs of versions that said so."""
+    met = {"name": "overruns", "limit": 3.0, "value": 0.0, "unit": "", "passed": True}
+    path = tmp_path / "log.mcap"
+    with open_log(path) as writer:
+        writer.step(records.record(0))
+        summary = {"steps": 1, "status": status, "criteria": [met]}
+        writer.finish({"status": status, "reason": "x", "summary": json.dumps(summary)})
+    assert [item["passed"] for item in json.loads(tcrctl("info", path, "--json")[1])["criteria"]] == [False]
+    out = tcrctl("info", path)[1]
+    assert "passed" not in out
+    assert "open, the run was stopped" in out
+    assert run_result(read_log(path))["criteria"][0]["passed"] is False
+
+
+def test_events_are_in_order_whoever_reports_them(tmp_path):
+    path = tmp_path / "log.mcap"
+    with open_log(path) as writer:
+        for t in (0.0, 0.3, 0.1, 0.4, 0.25):
+            writer.event(t, "task", "info", f"at {t}")
+        writer.finish(STOP)
+    events = [event for event in read_log(path).events() if event.kind == "task"]
+    assert [event.t for event in events] == [0.0, 0.3, 0.3, 0.4, 0.4]
+    assert [event.message for event in events] == [f"at {t}" for t in (0.0, 0.3, 0.1, 0.4, 0.25)]
 
 
 def test_info_describes_an_unfinished_and_an_empty_log(cut, tmp_path):

@@ -283,3 +283,8 @@ def test_a_problem_in_an_overridden_value_points_at_the_option() -> None:
     with pytest.raises(SpecError) as caught:
         strict_yaml.validate(document, Kennel)
     assert str(caught.value) == "--set pet.length_m: must be > 0.0, not -2"
+
+
+@pytest.mark.parametrize("text", ["\u00a0", "a\u2003", "\ufeffb: c", "\u200b- d"])
+def test_blanks_that_are_no_spaces_are_written_so_that_they_can_be_read(text: str) -> None:
+    assert strict_yaml.loads(strict_yaml.dumps({"a": [text]})).data == {"a": [text]}

@@ -114,6 +114,15 @@ def test_an_end_that_is_not_thrown_is_left_in_peace(tcr700):
     assert not np.any(places(dither, WAVE))
 
 
+@pytest.mark.parametrize(("away", "wakes"), [(0.7e-3, False), (4e-3, True)])
+def test_a_robot_that_slides_is_dithered_only_by_convincing_evidence(tcr700, away, wakes):
+    slides, never_tried = running(tcr700), running(tcr700)
+    settle(slides, tcr700, thrown=0.3)
+    beside = np.tile([away, 0.0, 0.0], (300, 1))
+    assert (watch(slides, beside, tcr700)[-1] > 0.0) == wakes
+    assert watch(never_tried, beside, tcr700)[-1] > 0.0
+
+
 def test_the_probing_wave_has_the_pattern_of_the_probe_and_no_mean(tcr700):
     dither, places_of = running(tcr700), []
     for _ in range(2 * WAVE):

@@ -61,6 +61,7 @@ def test_a_prediction_begins_at_the_models_tensions(tcr700, offset):
     assert "tension_gap" in predictor.memory()
 
 
+@pytest.mark.slow
 def test_a_plant_whose_cables_are_tighter_than_the_model_knows_is_not_wound_in(tcr700):
     """Drives go where the end must go; a controller that believes the tensions winds all cables in, or out."""
     paths = {}

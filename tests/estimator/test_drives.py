@@ -39,6 +39,7 @@ def believed(drives, reports, set_points):
     return np.array(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag", [0.0, 0.03, 0.1, 0.25])
 def test_drives_that_report_set_points_are_where_their_lag_leaves_them(lag):
     set_points, places = driven(lag)
@@ -55,6 +56,7 @@ def test_set_points_arrive_after_the_dead_time(dead_time):
     np.testing.assert_allclose(drives.set_point, set_points[-1])
 
 
+@pytest.mark.slow
 def test_encoders_are_believed():
     set_points, places = driven(0.1)
     found = believed(BelievedDrives(0.05, 0.0, "encoder", PERIOD), places, set_points)
@@ -69,6 +71,7 @@ def test_the_lag_of_drives_with_encoders_is_found(lag):
     assert drives.lag == pytest.approx(lag, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_lag_between_two_candidates_gives_one_of_them():
     set_points, places = driven(0.034)
     drives = BelievedDrives(None, 0.0, "encoder", PERIOD)
@@ -90,6 +93,7 @@ def test_drives_that_have_not_moved_have_no_lag():
     assert search.lag == CANDIDATES[0] == 0.0
 
 
+@pytest.mark.slow
 def test_a_lag_that_changes_is_followed():
     drives = BelievedDrives(None, 0.0, "encoder", PERIOD)
     for lag in (0.1, 0.03):

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from support import records
+from tcrctl.cli.run_table import rows
 from tcrctl.experiment.criterion import parse_criterion
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.summary import UNITS, Summary, judge
@@ -114,6 +115,27 @@ def test_overruns_are_steps_that_missed_their_period_by_the_clock():
     assert measures(steps, paced=False).overruns == 0
 
 
+def test_the_length_of_a_paced_run_is_that_of_the_clock():
+    period = records.PERIOD_S
+    timings = [Timing(0.0, 0.0, 0.0, 0.0, late) for late in (0.0, 0.9 * period, 9.0, 0.0)]
+    steps = [step(k, timing=timing) for k, timing in enumerate(timings)]
+    assert measures(steps).duration_s == pytest.approx(4 * period + 9.0)
+    assert measures(steps, paced=False).duration_s == pytest.approx(4 * period)
+    assert measures(steps[:3]).duration_s == pytest.approx(3 * period + 9.0)
+
+
+@pytest.mark.parametrize(("late", "words"), [(1, "steps, 5 %"), (9, "45 %")])
+def test_a_summary_says_how_many_steps_were_overruns_and_they_can_be_a_criterion(late, words):
+    timings = [Timing(0.0, 0.0, 0.0, 0.0, 1.1 * records.PERIOD_S * (k < late)) for k in range(20)]
+    made = summary(
+        measures([step(k, timing=timing) for k, timing in enumerate(timings)]), [f"overruns <= {late - 1}"]
+    )
+    (text,) = [text for name, text, _ in rows(made) if name == "overruns"]
+    assert words in text
+    assert "does not keep up" in text
+    assert [(verdict.name, verdict.passed) for verdict in made.criteria] == [("overruns", False)]
+
+
 def summary(found, criteria=()):
     made = Summary(
         "id", "spec", "robot", "simulated", "ioc", 0, (), "success", "", 0, found, (), Path("log.mcap")
@@ -138,6 +160,7 @@ KEYS = [
     "orientation_error_deg",
     "theta_x_error_rad",
     "theta_y_error_rad",
+    "theta_singular_fraction",
     "tension_n",
     "saturated_fraction",
     "control_ms",
@@ -185,6 +208,7 @@ def test_criteria_are_judged_on_the_values_they_name():
     assert [item["passed"] for item in judged] == [True, False, True, False, False]
     assert judged[0] == {
         "name": "position_error_mm.max",
+        "relation": "<=",
         "limit": 3.0,
         "value": pytest.approx(2.0),
         "unit": "mm",

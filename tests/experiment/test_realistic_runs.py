@@ -20,6 +20,8 @@ from tcrctl.robot.description import RobotDescription
 from tcrctl.robot.robot import build_robot
 from tcrctl.signals import Command
 
+pytestmark = pytest.mark.slow
+
 MODERATE = "plant.realistic=moderate"
 
 

@@ -18,8 +18,10 @@ from support.log_files import doctor
 from support.short_runs import ROOT, SHORT, arguments, short_spec, start
 from tcrctl.analysis.info import inspect
 from tcrctl.cli.app import main
+from tcrctl.cli.run_table import rows
 from tcrctl.controller.shell import Shell
 from tcrctl.errors import DeviceError, DivergenceError, InputError, LogError
+from tcrctl.experiment.criterion import parse_criterion
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.run_folder import make_run_folder
@@ -260,6 +262,7 @@ def test_what_fitted_at_the_start_and_does_not_later_is_a_device(tmp_path, monke
     assert json.loads(line)["reason"] == "the PLC says it is another one"
 
 
+@pytest.mark.slow
 def test_nobody_who_is_told_about_a_run_can_end_it(short, tmp_path):
     def gone(*message):
         raise BrokenPipeError(32, "Broken pipe")
@@ -313,6 +316,21 @@ def test_a_run_beyond_the_safety_limit_is_aborted_with_exit_code_4(short, tmp_pa
     last = list(read_log(summary.log).steps())[-1]
     assert not last.applied.speed.any()
     assert last.k + 1 == summary.measures.steps
+
+
+def test_a_stopped_run_has_passed_no_criterion_and_its_table_says_why(short, tmp_path):
+    """Not those either that were met so far: nobody knows what would have come."""
+    safety = short.spec.safety.model_copy(update={"position_error_mm": 1e-3})
+    asked = tuple(map(parse_criterion, ("position_error_mm.max <= 1000", "overruns <= 0")))
+    spec = short.spec.model_copy(update={"safety": safety, "criteria": asked})
+    summary = run_experiment(replace(short, spec=spec), out=tmp_path)
+    assert summary.status == "aborted"
+    assert [verdict.passed for verdict in summary.criteria] == [False, False]
+    shown = [(text, style) for name, text, style in rows(summary) if name == "criterion"]
+    assert [style for _, style in shown] == ["yellow", "yellow"]
+    assert all("the run was stopped" in text and "passed" not in text for text, _ in shown)
+    times = [event.t for event in read_log(summary.log).events()]
+    assert times == sorted(times)
 
 
 @pytest.mark.slow
@@ -488,7 +506,7 @@ def test_a_killed_run_keeps_all_steps_but_those_of_the_last_flush_interval(runni
     )  # missed steps are not made up for
     assert not log.complete
     assert steps == list(range(len(steps)))
-    flushed = elapsed - 0.5 - 0.3  # flush interval, and time for a busy machine
+    flushed = elapsed - 0.5 - 0.5  # flush interval, and one more: on a busy machine a flush is late, too
     assert len(steps) >= flushed / 0.05
     mended = recover(path, path.with_name("mended.mcap"))
     assert (mended.steps, mended.lossy) == (len(steps), True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +10,17 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from support.strict_types import TypeProblems
 from support.structured_text import FunctionBlock
-from tcr_hardware.emulators.plc_program import PlcCommand, PlcLimitSettings, PlcProgram
+from tcr_hardware.emulators.plc_command import PlcCommand
+from tcr_hardware.emulators.plc_limits import PlcLimitSettings
+from tcr_hardware.emulators.plc_program import DEAD_CLOCK_SCANS, PlcProgram
 from tcr_hardware.modbus.document import register_map_markdown
 from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status, register_map
 from tcr_hardware.servo import ServoSettings
+from tcrctl.emulate.bench import MARGIN
+from tcrctl.plant.rig.file import load_rig
+from tcrctl.robot.description import load_robot
 
 PLC = Path(__file__).parents[2] / "hardware" / "plc"
 BLOCK = FunctionBlock((PLC / "tcr_plc.st").read_text())
@@ -48,6 +55,7 @@ class BothPlcs:
         self.text = BLOCK.variables()
         self.text["CycleS"] = DT
         self.command = PlcCommand(Control(0), 0, (0,) * 6, 50_000.0, 0)
+        self.measured, self.told = None, math.nan
 
     def write(self, control, setpoints, vmax=50_000):
         """A new set, into both."""
@@ -66,9 +74,11 @@ class BothPlcs:
         program, text = self.emulated, self.text
         for _ in range(scans):
             text["EstopPressed"], text["DriveLost"] = program.estop, program.drive_lost
-            text["ActualUm"] = dict(enumerate((servo.position for servo in program.servos), start=1))
+            told = (at if at == at else self.told for at in program.readings())
+            text["ActualUm"] = dict(enumerate(told, start=1))
+            text["CycleS"] = DT if self.measured is None else self.measured
             BLOCK.scan(text)
-            program.scan(self.command, DT)
+            program.scan(self.command, DT, self.measured)
             assert list(text["ActiveUm"].values()) == pytest.approx(program.active, abs=1e-9)
             registers = text["HR"]
             assert registers[100] & ~Status.IN_POSITION == program.status() & ~Status.IN_POSITION
@@ -186,8 +196,8 @@ def test_both_plcs_ignore_zero_and_reset_while_a_drive_moves(armed, control):
 @pytest.mark.parametrize(
     ("setpoints", "vmax", "reject", "axis"),
     [
-        ((0, 0, 60_001, 0, 0, 0), 50_000, Reject.RANGE, 3),
-        ((0, 0, 0, 0, -60_001, 60_001), 50_000, Reject.RANGE, 5),
+        ((0, 0, 95_001, 0, 0, 0), 50_000, Reject.RANGE, 3),
+        ((0, 0, 0, 0, -35_001, 95_001), 50_000, Reject.RANGE, 5),
         ((0, 6_001, 0, 0, -6_001, 0), 50_000, Reject.STEP, 2),
         ((0,) * 6, 0, Reject.SPEED, 0),
         ((0,) * 6, 100_100, Reject.SPEED, 0),
@@ -211,7 +221,7 @@ def test_both_plcs_forget_the_silence_before_they_were_enabled(armed):
     assert armed.emulated.enabled
 
 
-positions = st.integers(-62_000, 62_000)
+positions = st.integers(-37_000, 97_000)
 events = st.tuples(
     st.sampled_from(
         [
@@ -281,3 +291,175 @@ def test_emulated_program_and_structured_text_agree_scan_by_scan_whatever_happen
     both.run(1)
     for event in script:
         act(both, *event)
+
+
+# ---- what compilers take ----
+
+
+def test_strict_compilers_find_nothing_to_say_about_the_program():
+    assert TypeProblems(BLOCK.tree).found == []
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "problem"),
+    [
+        ("HR[105] := UINT_TO_WORD(Cycle);", "HR[105] := HR[105] + 1;", "+: WORD and DINT/INT/UINT"),
+        ("Seq := HR[15];", "Seq := HR[15] * HR[15];", "*: WORD and WORD"),
+        ("    HR : TCR_REGISTERS;", "    HR : ARRAY [0..229] OF WORD;", "HR: array of no named type"),
+        (
+            "    ActualUm : TCR_AXES;",
+            "    ActualUm : ARRAY [1..6] OF LREAL;",
+            "ActualUm: array of no named type",
+        ),
+        (
+            "UINT_TO_LREAL(WORD_TO_UINT(HR[14]))",
+            "WORD_TO_LREAL(HR[14])",
+            "WORD_TO_LREAL: not in every edition",
+        ),
+        ("Reject := 16 * Verdict", "Reject := SHL(Verdict, 4)", "SHL: UINT"),
+        ("IF Fault <> 0 THEN StatusBits", "IF Fault THEN StatusBits", "IF: UINT, not BOOL"),
+        ("Control : WORD := 16#0000;", "Control : WORD := 0;", "Control in its declaration"),
+        ("    SilenceS := 0.0;", "    SilenceS := 0;", "SilenceS :=: DINT/INT/UINT, not LREAL"),
+    ],
+)
+def test_what_a_strict_compiler_stops_at_is_found(written, instead, problem):
+    source = (PLC / "tcr_plc.st").read_text()
+    assert written in source
+    found = TypeProblems(FunctionBlock(source.replace(written, instead, 1)).tree).found
+    assert any(problem in each for each in found), found
+
+
+def test_the_limits_of_the_program_are_those_of_the_shipped_rig():
+    """With the margin that the emulated bench has too: soft limits lie inside hard ones."""
+    rig = load_rig("loopback", load_robot("tcr700")).rig
+    registers = BLOCK.variables()
+    BLOCK.scan(registers)
+    limits = PlcLimitSettings()
+    for mounted in rig.robots.values():
+        for cable in mounted.cables.values():
+            assert (1e3 * cable.min_mm - MARGIN, 1e3 * cable.max_mm + MARGIN) == (
+                limits.min_um,
+                limits.max_um,
+            )
+            assert 1e3 * cable.speed_limit_mm_s <= limits.vmax_um_s
+    assert 1e3 * rig.safety.max_step_mm <= limits.step_max_um
+
+
+# ---- power-up, clocks, numbers ----
+
+
+def restart(both):
+    """Power comes back; the registers hold what they held, the zero is remembered."""
+    text, fresh = both.text, BLOCK.variables()
+    kept = {name: text[name] for name in ("HR", "OriginUm", "Zeroed")}
+    text |= {**fresh, **kept, "CycleS": DT}
+    both.emulated.power_up()
+
+
+@pytest.mark.parametrize(
+    "control", [FOLLOW, ON, Control(0x1F), FOLLOW | Control.RESET, Control.RUN | Control.ZERO, Control(0xFF)]
+)
+def test_a_program_that_starts_with_old_registers_enables_moves_and_zeroes_nothing(armed, control):
+    moving(armed)
+    armed.run(200)
+    where, at = armed.emulated.positions()[0], armed.emulated.servos[0].position
+    armed.text["HR"][0] = int(control)
+    armed.command = replace(armed.command, control=control & Control(0x1F))
+    restart(armed)
+    armed.run(200)
+    assert not armed.emulated.enabled
+    assert armed.emulated.positions()[0] == where > 1000.0
+    assert armed.emulated.servos[0].position == at
+    for k in range(20):  # a host that goes on as if nothing had happened
+        armed.write(control & Control(0x1F), (1_000 * k, 0, 0, 0, 0, 0))
+        armed.run(10)
+    assert not armed.emulated.enabled
+    armed.write(Control.RUN, (0,) * 6)
+    armed.run(2)
+    armed.write(ON, (0,) * 6)
+    armed.run(2)
+    assert armed.emulated.enabled
+
+
+@pytest.mark.parametrize("measured", [0.0, -1.0, math.nan, -math.inf, math.inf, 1e300, 5e-324])
+@pytest.mark.parametrize("then", [FOLLOW, Control.ENABLE, Control(0)])
+def test_no_measured_time_makes_a_set_point_that_is_no_number(armed, measured, then):
+    moving(armed)
+    armed.measured = measured
+    armed.run(3)
+    armed.write(then, (16_000, 0, 0, 0, 0, 0), 90_000)
+    armed.run(3)
+    armed.measured = None
+    armed.write(then, (16_000, 0, 0, 0, 0, 0), 90_000)
+    before = armed.emulated.active[0]
+    armed.run(1)
+    assert abs(armed.emulated.active[0] - before) <= 90_000 * DT + 1e-9
+    armed.run(50)
+    assert all(map(math.isfinite, armed.text["SetpointUm"].values()))
+    braking = 90_000**2 / (2 * PlcLimitSettings().deceleration_um_s2)
+    assert 0.0 <= armed.emulated.active[0] <= 16_000.0 + braking
+
+
+def test_a_clock_that_stands_still_is_a_fault_and_not_the_end_of_the_watchdog(armed):
+    armed.write(FOLLOW, (0,) * 6)
+    armed.measured = 0.0
+    armed.run(DEAD_CLOCK_SCANS - 1)
+    assert armed.emulated.enabled
+    armed.run(1)
+    assert (armed.emulated.fault, armed.emulated.enabled) == (FaultCode.CLOCK, False)
+
+
+def test_a_clock_coarser_than_the_scan_is_none(armed):
+    armed.write(FOLLOW, (1_000,) * 6)
+    for k in range(50):
+        armed.measured = 5 * DT if k % 5 == 4 else 0.0
+        armed.run(1)
+    assert armed.emulated.active == pytest.approx([1_000.0] * 6)
+    assert armed.emulated.enabled
+
+
+@pytest.mark.parametrize("told", [math.nan, math.inf, -1e300])
+def test_an_encoder_that_tells_no_position_stops_the_drives_where_they_are(armed, told):
+    moving(armed)
+    armed.told = told
+    armed.emulated.deaf = frozenset({1})
+    armed.run(100)
+    assert (armed.emulated.fault, armed.emulated.enabled) == (FaultCode.DRIVE, False)
+    assert all(map(math.isfinite, armed.text["SetpointUm"].values()))
+    armed.write(Control.RUN | Control.RESET, (0,) * 6)
+    armed.run(2)
+    assert armed.emulated.fault is FaultCode.DRIVE
+    armed.emulated.deaf = frozenset()
+    armed.write(Control.RUN, (0,) * 6)
+    armed.run(2)
+    armed.write(Control.RUN | Control.RESET, (0,) * 6)
+    armed.run(2)
+    assert armed.emulated.fault is FaultCode.NONE
+
+
+def test_no_set_point_is_valid_before_every_encoder_has_told_where_its_drive_is(armed):
+    moving(armed)
+    armed.run(200)
+    armed.emulated.deaf = frozenset({1})
+    restart(armed)
+    armed.run(5)
+    assert not armed.text["SetpointValid"]
+    armed.emulated.deaf = frozenset()
+    armed.run(1)
+    assert armed.text["SetpointValid"]
+    assert armed.text["SetpointUm"][1] == pytest.approx(armed.emulated.servos[0].position)
+
+
+@pytest.mark.parametrize("name", ["OriginUm", "ActiveUm", "TargetUm", "SpeedUmS", "LoadN"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_whatever_a_memory_holds_what_reaches_the_drives_is_a_number(name, value):
+    text = BLOCK.variables() | {"CycleS": DT, "Zeroed": True, "LoadValid": True}
+    for _ in range(3):
+        BLOCK.scan(text)
+    text[name][2] = value
+    text["HR"][0], text["HR"][15] = int(FOLLOW), 1
+    for k in range(20):
+        text["HR"][1] = k
+        BLOCK.scan(text)
+        assert all(map(math.isfinite, text["SetpointUm"].values()))
+    assert Status.READY not in Status(text["HR"][100] & sum(Status)) or math.isfinite(text["ActiveUm"][2])

@@ -24,6 +24,8 @@ from tcrctl.robot.robot import build_robot
 from tcrctl.trajectory.excitation import draw_poses
 from tcrctl.trajectory.excitation_settings import DrawSettings
 
+pytestmark = pytest.mark.slow
+
 ROBOT = "tcr5x4"
 SPEC = SelfCalibrationSpec(rest=RestSettings(stick=0.0, play_mm=0.0, noise_um=20.0))
 POSES = 14

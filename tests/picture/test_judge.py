@@ -1,4 +1,4 @@
-"""The picture judged in motion: what a robot cannot do is left out, named and said once; too much of it stops the run."""
+"""The picture judged in motion: what a robot cannot do is left out and said once; too much of it stops the run."""
 
 from __future__ import annotations
 

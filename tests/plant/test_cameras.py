@@ -91,6 +91,7 @@ def test_lost_markers_are_that_share_and_independent():
     assert np.abs(np.corrcoef(valid.T) - np.eye(MARKERS)).max() < 0.25
 
 
+@pytest.mark.slow
 def test_a_lost_frame_is_the_last_one_again_with_its_time():
     frames = moving(build(lost_frames=0.3), 300)
     lost = 0
@@ -122,6 +123,7 @@ def test_outliers_are_that_share_and_that_far_away():
     np.testing.assert_allclose(away[wild], 0.03, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_jitter_makes_frames_older_and_the_time_says_so():
     frames = moving(build(latency=0.01, age_jitter_ms=3.0), 400)[1:]
     ages = np.array([PERIOD * (k + 1) - frame.t for k, frame in enumerate(frames)]) - 0.01

@@ -68,6 +68,7 @@ def test_the_damper_of_stretches_in_series_is_that_of_the_cable(tcr5x4):
     assert errors[2] < errors[0] < 3e-4
 
 
+@pytest.mark.slow
 def test_a_robot_that_sticks_stays_for_a_minute(tcr5x4):
     plant = settled(tcr5x4, 0.3)
     slip = plant._body.state.slip
@@ -77,6 +78,7 @@ def test_a_robot_that_sticks_stays_for_a_minute(tcr5x4):
     assert np.abs(plant.truth().q - shape).max() < 1e-7
 
 
+@pytest.mark.slow
 def test_pushed_and_let_go_a_robot_with_friction_stays_beside_its_equilibrium(tcr5x4):
     push = {"ring": 5, "force_n": (0.3, 0.0, 0.0), "start_s": 0.0, "duration_s": 2.0}
     beside = {}
@@ -143,6 +145,7 @@ def loop(robot, mu, step_ms, amplitude=0.015):
     return area
 
 
+@pytest.mark.slow
 def test_the_loop_has_an_area_that_does_not_depend_on_the_step(tcr5x4):
     coarse, middle, fine = (loop(tcr5x4, 0.1, step) for step in (5.0, 2.5, 1.25))
     assert fine > 1e-4
@@ -151,6 +154,7 @@ def test_the_loop_has_an_area_that_does_not_depend_on_the_step(tcr5x4):
     assert fine > 3.0 * loop(tcr5x4, 0.0, 2.5)
 
 
+@pytest.mark.slow
 def test_the_motion_converges_with_the_step(tcr5x4):
     """Of first order, on a way on which holes stick, slide and turn."""
     ends = {}

@@ -42,6 +42,7 @@ def many(value, count=60, **settings):
     return np.array([value(drawn(seed, **settings)) for seed in range(count)])
 
 
+@pytest.mark.slow
 def test_springs_of_a_joint_deviate_together_and_each_a_little():
     common = many(lambda d: [s.axial_stiffness for s in spring_list(d)], springs=0.1)
     common /= spring_list(load_robot("tcr700"))[0].axial_stiffness
@@ -55,6 +56,7 @@ def test_springs_of_a_joint_deviate_together_and_each_a_little():
     assert np.ptp(single.reshape(-1, 13, 3), axis=2).min() > 1e-4
 
 
+@pytest.mark.slow
 def test_masses_geometry_and_holes_have_the_wanted_deviation():
     masses = many(lambda d: [d.modules.of(i).mass_g for i in range(1, 14)], masses=0.05)
     assert masses.std() == pytest.approx(0.5, rel=0.1)

@@ -91,6 +91,7 @@ def test_giving_way_only_takes_energy(stretches):
         )
 
 
+@pytest.mark.slow
 def test_a_robot_begins_at_rest_and_remembers_where_it_has_been(tcr5x4):
     """Bent to one side or to the other and straightened again: the end is not at the same place."""
     ends = []

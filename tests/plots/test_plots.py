@@ -189,8 +189,8 @@ def test_errors_are_those_of_the_run_itself(pose):
     assert_allclose(history.orientation_error, angle, atol=1e-12)
     legends = [axes.get_legend() for axes in draw("error", pose).axes]
     first, last = (legends[i].get_texts()[0].get_text() for i in (0, -1))
-    assert f"max {1e3 * max(apart):.3g} mm" in first
-    assert f"max {np.degrees(max(angle)):.3g} deg" in last
+    assert f"max {1e3 * max(apart):.4g} mm" in first
+    assert f"max {np.degrees(max(angle)):.4g} deg" in last
 
 
 def test_orientation_angles_are_those_of_the_controller_but_without_jumps():

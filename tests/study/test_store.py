@@ -158,6 +158,27 @@ def test_a_robot_of_the_same_name_with_other_numbers_has_another_address(tmp_pat
     assert address(load_spec(str(spec)), 1, random_path=False) != before
 
 
+def test_samples_and_code_of_others_count_by_what_is_in_their_files(tmp_path):
+    spec = tmp_path / "spec.yaml"
+    own = "trajectory: {kind: table, file: path.csv}\ncontroller: {kind: ./own.py:OWN, period_s: 0.05}\n"
+    spec.write_text(f"name: mine\nrobot: tcr600\nplant: {{kind: simulated}}\n{own}")
+    rows = "t_s,x_mm,y_mm,z_mm\n" + "\n".join(f"{t},{{}},0,-600" for t in range(5)) + "\n"
+    code = """
+from tcrctl.extend import OwnControllerSection
+class Own(OwnControllerSection):
+    pass
+OWN = (Own, lambda settings, robot: None)
+"""
+
+    def written(x, comment):
+        (tmp_path / "path.csv").write_text(rows.format(*[x * t for t in range(5)]))
+        (tmp_path / "own.py").write_text(code + comment)
+        return address(load_spec(str(spec)), 1, random_path=False)
+
+    assert written(1, "") == written(1, "")
+    assert len({written(1, ""), written(2, ""), written(1, "# another")}) == 3
+
+
 def test_a_robot_beside_the_study_is_found_and_counts_by_what_it_says_not_by_where_it_is(tmp_path):
     text = load_spec("letter_t").robot_path.read_text()
     found = []

@@ -16,7 +16,7 @@ import numpy as np
 
 from tcr_hardware.emulators.motive import MotiveEmulator, MotiveFaults, MotiveSettings
 from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
-from tcr_hardware.emulators.plc_program import PlcLimitSettings
+from tcr_hardware.emulators.plc_limits import PlcLimitSettings
 from tcr_hardware.modbus.registers import Control
 from tcrctl.errors import TcrctlError
 from tcrctl.loop.pacing import RealTime
@@ -125,6 +125,7 @@ CASES = [
     blinding("all markers not listed", missing=MARKERS),
     blinding("all markers are NaN", nan=MARKERS),
     blinding("no marker has a label", unlabelled=True),
+    blinding("a second source of frames", second_source=1.0),
     harmless("models announced anew", cameras=("change_models", NAMES)),
     harmless("stream changes to NatNet 3.1", cameras=("change_version", "3.1")),
     Case("markers renamed", ("change_models", [f"{name}?" for name in NAMES]), moving="disarmed",
@@ -159,6 +160,10 @@ CASES = [
          stopping="faulted", says="fault", rule="now"),
     Case("a drive is jammed", plc=("jam", {"axis": 2}), moving="disarmed", says="set-point", rule="following"),
     Case("PLC power cycle", plc=("restart", {}), armed="faulted", moving="faulted", rule="silence"),
+    Case("PLC power cycle, registers survive", plc=("restart", {"keep": 1}), armed="faulted", moving="faulted",
+         rule="silence"),
+    Case("an encoder fails", plc=("encoder", {"axis": 2}), connect="disarmed", armed="faulted", moving="faulted",
+         stopping="faulted", says="fault", rule="now"),
 ]  # fmt: skip
 
 
@@ -191,6 +196,10 @@ class WatchedEmulators:
     rules: dict[str, Any]
     watchdog_ms: int = 200
     high_mm: float = HIGH_UM / 1e3
+    motive_settings: MotiveSettings = field(
+        default_factory=lambda: MotiveSettings(command_port=0, rate_hz=200.0)
+    )
+    timeout_ms: float = 60
     sent: list = field(default_factory=list)
     events: list = field(default_factory=list)
 
@@ -199,7 +208,7 @@ class WatchedEmulators:
         self.motive = MotiveEmulator(
             NAMES,
             lambda: rest + 5e-5 * random.standard_normal(rest.shape),
-            MotiveSettings(command_port=0, rate_hz=200.0),
+            self.motive_settings,
         )
         limits = PlcLimitSettings(min_um=-25_000, max_um=25_000, watchdog_ms=self.watchdog_ms)
         self.plc = PlcEmulator(PlcSettings(limits=limits))
@@ -239,6 +248,7 @@ class WatchedEmulators:
                                 "kind": "modbus_tcp",
                                 "host": self.plc.address[0],
                                 "port": self.plc.address[1],
+                                "timeout_ms": self.timeout_ms,
                             },
                             "cables": cables,
                             "markers": {"labels": "m{ring}.n{node}"},

@@ -1,7 +1,7 @@
-"""Pictures of a robot that bends slowly, as cameras with biased, noisy markers in a frame that is a little off see it.
+"""Pictures of a robot that bends slowly, as cameras see it: biased and noisy markers, a frame that is a little off.
 
-The robot is at rest at every moment, of other material than the controller knows; so tests can look at every kind of
-wrong picture without an experiment for each.
+The robot is at rest at every moment, of other material than the controller knows; so tests can look at every kind
+of wrong picture without an experiment for each.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ import copy
 from lark import Lark, Token, Tree
 
 GRAMMAR = r"""
-start: "FUNCTION_BLOCK" NAME declarations* statement* "END_FUNCTION_BLOCK"
+start: types* "FUNCTION_BLOCK" NAME declarations* statement* "END_FUNCTION_BLOCK"
+types: "TYPE" (NAME ":" type ";")* "END_TYPE"
 declarations: SECTION ("CONSTANT" | "RETAIN")? declaration* "END_VAR"
 declaration: NAME ":" type [":=" expression] ";"
 type: NAME | "ARRAY" "[" WHOLE ".." WHOLE "]" "OF" NAME -> array
@@ -66,14 +67,16 @@ FUNCTIONS = {
     "SHL": lambda bits, by: bits << by,
     "SHR": lambda bits, by: bits >> by,
     "WORD_TO_DWORD": int,
-    "WORD_TO_LREAL": float,
-    "INT_TO_WORD": lambda value: value & 0xFFFF,
+    "WORD_TO_UINT": int,
+    "UINT_TO_WORD": int,
+    "UINT_TO_LREAL": float,
+    "INT_TO_UINT": int,
     "DWORD_TO_DINT": signed,
     "DWORD_TO_WORD": lambda bits: bits & 0xFFFF,
     "DINT_TO_DWORD": lambda value: value & 0xFFFFFFFF,
     "DINT_TO_LREAL": float,
     "LREAL_TO_DINT": round,  # to the nearest, as the standard says
-    "LREAL_TO_WORD": lambda value: round(value) & 0xFFFF,
+    "LREAL_TO_UINT": round,
 }
 ZEROS = {"BOOL": False, "LREAL": 0.0}
 PYTHON = {"OR": "|", "AND": "&", "=": "==", "<>": "!="}
@@ -84,11 +87,17 @@ class FunctionBlock:
 
     def __init__(self, source):
         tree = Lark(GRAMMAR, parser="lalr").parse(source)
-        self.types, self._initial = {}, {}
+        self.tree, self.types, self._initial, self._named = tree, {}, {}, {}
+        for types in tree.find_data("types"):
+            self._named |= dict(zip(map(str, types.children[::2]), types.children[1::2], strict=True))
         for section in tree.find_data("declarations"):
             for declaration in section.children[1:]:
                 self._declare(*declaration.children)
-        body = [child for child in tree.children[1:] if child.data != "declarations"]
+        body = [
+            child
+            for child in tree.children
+            if isinstance(child, Tree) and child.data not in ("declarations", "types")
+        ]
         lines = ["def scan(v):", *(line for statement in body for line in self._statement(statement, 1))]
         scope = {**FUNCTIONS, "inverted": inverted}
         exec("\n".join(lines), scope)
@@ -103,6 +112,7 @@ class FunctionBlock:
         self._scan(variables)
 
     def _declare(self, name, kind, initial):
+        kind = self._named.get(str(kind.children[0]), kind)
         if kind.data == "array":
             first, last, of = kind.children
             self.types[str(name)] = str(of)

@@ -1,7 +1,7 @@
 """Runs on the emulated bench whose cameras show a wrong picture, and what the robot really does meanwhile.
 
-The emulated bench runs in a process of its own, which writes down where the end of the robot is. Both processes read
-the same clock.
+The emulated bench runs in a process of its own, which writes down where the end of the robot is. Both processes
+read the same clock.
 """
 
 from __future__ import annotations

@@ -101,6 +101,6 @@ def test_the_table_for_people_tells_what_the_task_found(tmp_path, capsys, monkey
     overrides = [part for text in (*BELOW, "task.beam_mm=15.999") for part in ("--set", text)]
     assert main(["run", "laser_pipe", "--quiet", "--out", str(tmp_path), *overrides]) == 3
     printed = capsys.readouterr()
-    assert "low: position error" in printed.out
-    assert "beam passes no" in printed.out
+    assert "target low" in printed.out
+    assert "the beam does not go through" in printed.out
     assert "task.targets.0.beam_passes is false, must be == true" in printed.err

@@ -55,6 +55,7 @@ def test_swings_die_away_to_and_fro():
     assert found.tolist() == [4.0, -3.0, 2.0, -1.0]
 
 
+@pytest.mark.slow
 def test_poses_that_cannot_be_taut_are_refused(tcr700):
     settings = FEW.model_copy(update={"draw": DrawSettings(floor_n=50.0, ceiling_n=51.0)})
     with pytest.raises(InputError, match="could be drawn"):

@@ -88,6 +88,7 @@ class Playing:
         assert self.failure is None
 
 
+@pytest.mark.slow
 def test_a_client_receives_every_message_of_a_log_played_five_times_as_fast(log):
     begin = time.monotonic()
     with Playing(log, rate=5.0, once=True) as playing, ViewerClient(playing.url) as client:
@@ -101,6 +102,7 @@ def test_a_client_receives_every_message_of_a_log_played_five_times_as_fast(log)
     assert took > (LAST_NS - FIRST_NS) / 5e9
 
 
+@pytest.mark.slow
 def test_the_time_bar_pauses_seeks_and_sets_the_speed(log):
     middle = FIRST_NS + 1_500_000_000
     with Playing(log, paused=True) as playing, ViewerClient(playing.url) as client:

@@ -173,7 +173,6 @@ class MotiveEmulator:
             self.ticks(now),
             self.ticks(received),
             self.ticks(sent),
-            sent - received,
             flags,
         )
         seen = self._distortion.seen(self.tracked, self._positions(), self.faults, now)
@@ -200,6 +199,8 @@ class MotiveEmulator:
                 1.0 / self.settings.rate_hz,
                 self.faults,
             )
+            if self._outbox.happens(self.faults.second_source):
+                self.link.send_as_stranger(encoded[key], destination)
         self.frames_sent += bool(encoded)
 
     def _encode(self, version: Version, flags: int, stamp: Stamp, view: View) -> bytes:

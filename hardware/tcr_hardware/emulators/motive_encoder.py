@@ -1,4 +1,4 @@
-"""NatNet as a server writes it, versions 2.5 to 4.3 [NN24]: struct codes, nothing shared with the client."""
+"""NatNet as a server writes it, versions 2.5 to 4.4 [NN24]: struct codes, nothing shared with the client."""
 
 from __future__ import annotations
 
@@ -27,7 +27,6 @@ class Stamp:
         mid_exposure: Server clock [ticks].
         received: Server clock [ticks].
         transmit: Server clock [ticks].
-        latency: From the arrival of the camera data to sending [s].
         params: Flags.
     """
 
@@ -36,7 +35,6 @@ class Stamp:
     mid_exposure: int
     received: int
     transmit: int
-    latency: float
     params: int
 
 
@@ -116,7 +114,8 @@ def _labelled(version: Version, view: View) -> bytes:
 
 
 def _suffix(version: Version, stamp: Stamp) -> bytes:
-    out = struct.pack("<f", stamp.latency) if version < (3, 0) else b""
+    # Headers of the vendor call the first number of old suffixes a latency; Motive writes the time of the frame.
+    out = struct.pack("<f", stamp.timestamp) if version < (3, 0) else b""
     out += struct.pack("<II", 0, 0)  # time code
     if version >= (2, 7):
         out += struct.pack("<d", stamp.timestamp)

@@ -26,6 +26,7 @@ class MotiveFaults:
         missing: Markers that are not seen and not listed.
         nan: Markers at no position at all.
         swap: Pairs of markers whose labels are exchanged.
+        second_source: Share of frames that come from another port of the same computer too.
         offset_m: All markers jump by this [m].
         turned_deg: The frame is turned by this rotation vector, in the axes of the cameras [deg].
         turning_deg_s: The frame turns at this rate from now on [deg/s].
@@ -53,6 +54,7 @@ class MotiveFaults:
     missing: frozenset[str] = frozenset()
     nan: frozenset[str] = frozenset()
     swap: tuple[tuple[str, str], ...] = ()
+    second_source: float = 0.0
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turning_deg_s: tuple[float, float, float] = (0.0, 0.0, 0.0)

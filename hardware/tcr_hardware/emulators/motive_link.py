@@ -38,6 +38,7 @@ class MotiveLink:
         self._command = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._command.setblocking(False)
         self._group: socket.socket | None = None
+        self._stranger: socket.socket | None = None
         try:
             self._command.bind((settings.host, settings.command_port))
             if settings.multicast:
@@ -100,11 +101,19 @@ class MotiveLink:
         with contextlib.suppress(BlockingIOError, ConnectionError):
             through.sendto(datagram, destination)
 
+    def send_as_stranger(self, datagram: bytes, destination: Address) -> None:
+        """Send as another program on this computer would, from a port of its own."""
+        if self._stranger is None:
+            self._stranger = _multicast_sender(self.settings.host)
+            self._stranger.bind((self.settings.host, 0))
+        with contextlib.suppress(BlockingIOError, ConnectionError):
+            self._stranger.sendto(datagram, destination)
+
     def close(self) -> None:
         """Close the sockets."""
-        self._command.close()
-        if self._group is not None:
-            self._group.close()
+        for each in (self._command, self._group, self._stranger):
+            if each is not None:
+                each.close()
 
 
 def _multicast_sender(host: str) -> socket.socket:

@@ -20,6 +20,10 @@ class Outbox:
         self._count = itertools.count()
         self._waiting: list[tuple[float, int, bytes, Address]] = []
 
+    def happens(self, chance: float) -> bool:
+        """Tell whether something of this chance happens now."""
+        return chance > 0.0 and self._random.random() < chance
+
     def put(
         self, datagram: bytes, destination: Address, leaves: float, period: float, faults: MotiveFaults
     ) -> None:

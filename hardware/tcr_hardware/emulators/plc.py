@@ -18,9 +18,11 @@ from dataclasses import dataclass, field
 from tcr_hardware.emulators.modbus_rtu import RtuPort
 from tcr_hardware.emulators.modbus_server import ModbusServer
 from tcr_hardware.emulators.modbus_tcp import TcpPort
+from tcr_hardware.emulators.plc_command import command_of
 from tcr_hardware.emulators.plc_faults import PlcFaults
 from tcr_hardware.emulators.plc_image import PlcImage, Values, identity
-from tcr_hardware.emulators.plc_program import PlcLimitSettings, PlcProgram, command_of
+from tcr_hardware.emulators.plc_limits import PlcLimitSettings
+from tcr_hardware.emulators.plc_program import PlcProgram
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.modbus.registers import RegisterMap, Status, register_map
 from tcr_hardware.servo import ServoSettings
@@ -162,11 +164,12 @@ class PlcEmulator:
         """Pull it out again."""
         self.faults.clear("estop")
 
-    def restart(self) -> None:
-        """Cycle the power: connections are reset, registers are 0, nothing is enabled."""
+    def restart(self, *, keep: bool = False) -> None:
+        """Cycle the power: connections are reset, nothing is enabled, registers are 0 unless they are kept."""
         with self._lock:
             self._advance()
-            self._image.clear()
+            if not keep:
+                self._image.clear()
             self._program.power_up()
         if self._tcp is not None:
             self._tcp.reset()
@@ -207,13 +210,14 @@ class PlcEmulator:
         if now - self._now < dt:
             return
         hangs = self.faults.get("freeze_program") is not None
+        measured = 0.0 if self.faults.get("dead_clock") is not None else None
         command = command_of(self._image.command())
         while now - self._now >= dt:
             self._now += dt
             if hangs:
                 self._program.coast(dt)
             else:
-                self._program.scan(command, dt)
+                self._program.scan(command, dt, measured)
 
     def _tick(self) -> None:
         """Let time advance also when nobody asks."""
@@ -251,7 +255,7 @@ class PlcEmulator:
     def _fault_changed(self, name: str, is_set: bool) -> None:
         """Carry out faults that are not looked up when a request is answered."""
         if name == "restart" and is_set:
-            self.restart()
+            self.restart(keep=bool((self.faults.get(name) or {}).get("keep")))
         elif name == "reset" and is_set and self._tcp is not None:
             self._tcp.reset()
         if name == "refuse" and is_set and self._tcp is not None:
@@ -262,6 +266,7 @@ class PlcEmulator:
             self._advance()
             self._program.estop = self.faults.get("estop") is not None
             self._program.drive_lost = self.faults.get("drive") is not None
-            jammed = self.faults.get("jam")
+            deaf, jammed = self.faults.get("encoder"), self.faults.get("jam")
+            self._program.deaf = frozenset() if deaf is None else frozenset({int(deaf["axis"] or 0)})
             for axis, servo in enumerate(self._program.servos, start=1):
                 servo.jammed = jammed is not None and axis == int(jammed["axis"] or 0)

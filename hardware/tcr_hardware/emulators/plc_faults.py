@@ -48,7 +48,9 @@ FAULTS: Mapping[str, FaultKind] = MappingProxyType(
         "estop": FaultKind("the e-stop button is pressed"),
         "drive": FaultKind("the field bus to the drives is down"),
         "jam": FaultKind("the shaft of an axis does not move", {"axis": 1}),
-        "restart": FaultKind("power cycle, once"),
+        "encoder": FaultKind("the encoder of an axis tells no position", {"axis": 1}),
+        "dead_clock": FaultKind("its program measures no time between scans"),
+        "restart": FaultKind("power cycle, once; with keep: 1 the command registers survive", {"keep": 0}),
     }
 )
 

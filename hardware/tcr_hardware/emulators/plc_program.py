@@ -9,13 +9,16 @@
             fault latched <--------+ <-------------------------+   watchdog, e-stop, following error, drive
 
 The drives hold in every state: letting go drops the robot. A stop wants a new ENABLE edge, a fault a RESET first.
+What the registers hold at the first scan after power-up was written before: ENABLE has to be seen as 0 first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
 
+from tcr_hardware.emulators.plc_command import PlcCommand
+from tcr_hardware.emulators.plc_limits import PlcLimitSettings
 from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status
 from tcr_hardware.servo import Servo, ServoSettings
 
@@ -23,48 +26,12 @@ from tcr_hardware.servo import Servo, ServoSettings
 SHORTEST_INTERVAL_S, LONGEST_INTERVAL_S = 0.002, 0.1
 #: A drive within this distance of its set-point is in position [um].
 IN_POSITION_UM = 50.0
-
-
-@dataclass(frozen=True, slots=True)
-class PlcLimitSettings:
-    """What the program enforces by itself.
-
-    Attributes:
-        min_um: Lower end of every stroke [um].
-        max_um: Upper end of every stroke [um].
-        vmax_um_s: Largest speed of the set-points [um/s].
-        step_max_um: Largest change of a set-point from one set to the next [um].
-        watchdog_ms: Silence after which it stops [ms].
-        deceleration_um_s2: Deceleration of a stop [um/s2].
-        following_um: Following error that is a fault [um].
-    """
-
-    min_um: int = -60_000
-    max_um: int = 60_000
-    vmax_um_s: int = 100_000
-    step_max_um: int = 6_000
-    watchdog_ms: int = 200
-    deceleration_um_s2: int = 2_000_000
-    following_um: int = 8_000
-
-
-@dataclass(frozen=True, slots=True)
-class PlcCommand:
-    """What the program finds in its command registers at the start of a scan.
-
-    Attributes:
-        control: Control bits.
-        heartbeat: HEARTBEAT.
-        setpoints: SP (axes,) [um].
-        vmax: VMAX [um/s].
-        seq: SEQ.
-    """
-
-    control: Control
-    heartbeat: int
-    setpoints: tuple[float, ...]
-    vmax: float
-    seq: int
+#: Time between two scans beyond these is not counted, for motion and for silence [s].
+LONGEST_SCAN_S, LONGEST_SILENCE_S = 0.1, 10.0
+#: So many scans without time between them: the watchdog has no clock.
+DEAD_CLOCK_SCANS = 1000
+#: No encoder of a cable tells more [um].
+LARGEST_UM = 1e9
 
 
 class PlcProgram:
@@ -74,6 +41,7 @@ class PlcProgram:
         servos: The drives.
         estop: The e-stop button is pressed.
         drive_lost: The field bus to the drives is down.
+        deaf: Axes, from 1, whose encoders tell no position.
         cycle: Scan counter.
         fault: Latched fault.
         enabled: Operation is enabled.
@@ -93,17 +61,20 @@ class PlcProgram:
         *,
         zeroed: bool,
     ) -> None:
-        """Power up with all drives at rest at 0."""
+        """Be at rest at 0, after scans in which all registers were 0."""
         self._limits = limits
         drives = [servo] * axes if isinstance(servo, ServoSettings) else servo
         self.servos = [Servo(drive) for drive in drives]
         self.estop = self.drive_lost = False
+        self.deaf: frozenset[int] = frozenset()
         self._origin = [0.0] * axes
         self.power_up()
-        self.zeroed = zeroed
+        self.zeroed, self._started = zeroed, True
 
     def power_up(self) -> None:
         """Start anew, where the drives stand; absolute encoders keep the zero."""
+        self._started, self._blind, self._still_scans = False, False, 0
+        self._position = [0.0] * len(self.servos)
         self.cycle = self.seq_ack = self.heartbeat_echo = 0
         self._seq_seen, self._silence_s, self._since_set_s = 0, 0.0, LONGEST_INTERVAL_S
         self._control = Control(0)
@@ -113,9 +84,17 @@ class PlcProgram:
         self.active = self.positions()
         self._target, self._speed, self._time_left_s = list(self.active), [0.0] * len(self.servos), 0.0
 
+    def readings(self) -> list[float]:
+        """Return what the encoders tell (axes,) [um]."""
+        return [
+            math.nan if axis in self.deaf else servo.position
+            for axis, servo in enumerate(self.servos, start=1)
+        ]
+
     def positions(self) -> list[float]:
-        """Return the positions reported (axes,), since tension zero [um]."""
-        return [servo.position - origin for servo, origin in zip(self.servos, self._origin, strict=True)]
+        """Return the positions reported (axes,), since tension zero [um]; the last one where there is none."""
+        seen = zip(self.readings(), self._origin, self._position, strict=True)
+        return [at - origin if abs(at) <= LARGEST_UM else last for at, origin, last in seen]
 
     def status(self) -> Status:
         """Return the status bits."""
@@ -135,17 +114,30 @@ class PlcProgram:
             (Status.WATCHDOG, self.watchdog),
             (Status.REMOTE, True),
             (Status.IN_POSITION, at_rest and not self._moving()),
-            (Status.DRIVE_COMM, self.drive_lost),
+            (Status.DRIVE_COMM, self.drive_lost or self._blind),
         )
         return Status(sum(bit for bit, is_set in bits if is_set))
 
-    def scan(self, command: PlcCommand, dt: float) -> None:
-        """Do one cycle of the program, ``dt`` [s] after the last."""
+    def scan(self, command: PlcCommand, dt: float, measured: float | None = None) -> None:
+        """Do one cycle of the program.
+
+        Args:
+            command: The command registers.
+            dt: Time since the last one [s]; the drives move for as long.
+            measured: That time as the program measures it [s]; anything, also no number; None: right.
+        """
+        measured = dt if measured is None else measured
+        passed = min(measured, LONGEST_SILENCE_S) if measured > 0.0 else 0.0
+        self._still_scans = 0 if measured > 0.0 else min(self._still_scans + 1, DEAD_CLOCK_SCANS)
+        self._position = self.positions()
+        self._blind = not all(abs(at) <= LARGEST_UM for at in self.readings())
+        if not self._started:
+            self._begin(command)
         self.cycle = (self.cycle + 1) & 0xFFFF
         rising = command.control & ~self._control
         self._control = command.control
         self._tripped = False
-        self._watch(command, dt)
+        self._watch(command, passed)
         self._find_faults()
         if self._tripped:
             self._stop()
@@ -154,31 +146,41 @@ class PlcProgram:
         if Control.ZERO in rising:
             self._zero()
         self._permit(command, rising)
-        self._take(command, dt)
-        self._move(command, dt)
+        scan_s = min(passed, LONGEST_SCAN_S)
+        self._take(command, scan_s)
+        self._move(command, scan_s)
         self.coast(dt)
+
+    def _begin(self, command: PlcCommand) -> None:
+        """Take bits written before power-up for no edges; stand where the drives stand, once they tell."""
+        before = Control.ENABLE | Control.RESET | (Control.ZERO if self.zeroed else Control(0))
+        self._control, self._started = command.control & before, not self._blind
+        self.active, self._target = list(self._position), list(self._position)
+        self._speed = [0.0] * len(self.servos)
 
     def coast(self, dt: float) -> None:
         """Let time pass for the drives alone: they follow their last set-points, also while the program hangs."""
         for servo, active, origin in zip(self.servos, self.active, self._origin, strict=True):
-            servo.advance(active + origin, dt)
+            servo.advance(active + origin if self._started else servo.position, dt)
 
     def _watch(self, command: PlcCommand, dt: float) -> None:
         """Watch that the host changes HEARTBEAT while operation is enabled."""
         alive = command.heartbeat != self.heartbeat_echo
         self.heartbeat_echo = command.heartbeat
-        self._silence_s = 0.0 if alive else self._silence_s + dt
+        self._silence_s = 0.0 if alive else min(self._silence_s + dt, LONGEST_SILENCE_S)
         if self.enabled and 1e3 * self._silence_s >= self._limits.watchdog_ms:
             self.watchdog = True
             self._trip(FaultCode.WATCHDOG)
+        if self.enabled and self._still_scans >= DEAD_CLOCK_SCANS:
+            self._trip(FaultCode.CLOCK)
 
     def _find_faults(self) -> None:
         """Look for faults of the machine itself."""
         if self.estop:
             self._trip(FaultCode.ESTOP)
-        if self.drive_lost:
+        if self.drive_lost or self._blind:
             self._trip(FaultCode.DRIVE)
-        for axis, at in enumerate(self.positions()):
+        for axis, at in enumerate(self._position):
             if abs(self.active[axis] - at) > self._limits.following_um:
                 self.following_error = True
                 self.active[axis], self._speed[axis] = at, 0.0  # no jump when the axis comes free
@@ -197,16 +199,16 @@ class PlcProgram:
 
     def _reset(self) -> None:
         """Acknowledge a fault, once its cause is gone and everything stands."""
-        if not (self.estop or self.drive_lost or self._moving()):
+        if not (self.estop or self.drive_lost or self._blind or self._moving()):
             self.fault, self.watchdog, self.following_error = FaultCode.NONE, False, False
 
     def _zero(self) -> None:
         """Take the present positions as zero."""
-        if self._following or self._moving():
+        if self._following or self._moving() or self._blind:
             return
         self._origin = [servo.position for servo in self.servos]
         self.active = [0.0] * len(self.servos)
-        self._target, self.zeroed = list(self.active), True
+        self._position, self._target, self.zeroed = list(self.active), list(self.active), True
 
     def _ready(self) -> bool:
         """Tell whether an ENABLE edge would be obeyed, given RUN."""
@@ -269,7 +271,8 @@ class PlcProgram:
             step = min(max(wanted, -cap), cap)
             self.limited = self.limited or step != wanted
             self.active[axis] += step
-            self._speed[axis] = step / dt
+            if dt > 0.0:
+                self._speed[axis] = step / dt  # in no time there is no new speed
 
     def _brake(self, dt: float) -> None:
         """Slow down to rest, within the strokes."""
@@ -287,14 +290,3 @@ class PlcProgram:
     def _moving(self) -> bool:
         """Tell whether a set-point of the drives moves."""
         return any(self._speed)
-
-
-def command_of(values: Mapping[str, Sequence[float]]) -> PlcCommand:
-    """Command from the values of the command registers by name."""
-    return PlcCommand(
-        Control(int(values["CTRL"][0]) & sum(Control)),
-        int(values["HEARTBEAT"][0]),
-        tuple(values["SP"]),
-        values["VMAX"][0],
-        int(values["SEQ"][0]),
-    )

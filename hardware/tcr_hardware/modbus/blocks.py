@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,11 @@ class Counters:
 
     seq: int = 0
     heartbeat: int = 0
+
+    @classmethod
+    def drawn(cls) -> Counters:
+        """Return counters that no other program has, but for one in four thousand million."""
+        return cls(secrets.randbelow(1 << 16), secrets.randbelow(1 << 16))
 
     def next_block(self) -> Counters:
         """Return the counters of the next set of set-points, before it is written."""

@@ -4,6 +4,9 @@
     set-points --> command block --> FC23 or FC16, FC3 --> status block --> echo and position checks --> PlcStatus
 
 A failed exchange is repeated with the same SEQ, so that the PLC takes each set of set-points once at most.
+
+One program writes to a PLC. It claims it by drawn numbers in SEQ and HEARTBEAT that must still stand there after a
+while, as in Fischer's mutual exclusion: of several that begin at once the last to write is the one.
 """
 
 from __future__ import annotations
@@ -22,12 +25,13 @@ from tcr_hardware.modbus.errors import (
     MapError,
     PlcExceptionError,
     PlcMismatchError,
+    PlcTakenError,
     StaleAnswerError,
     WrongEchoError,
 )
 from tcr_hardware.modbus.link import Dial, ModbusLink
 from tcr_hardware.modbus.liveness import Liveness
-from tcr_hardware.modbus.registers import MAP_VERSION, Control, Reject
+from tcr_hardware.modbus.registers import MAP_VERSION, Control, Reject, Status
 from tcr_hardware.modbus.settings import EXCHANGES, BusSettings
 from tcr_hardware.modbus.status import BusStatistics, PlcInfo, PlcSlow, PlcStatus
 from tcr_hardware.modbus.wire_time import share_of_period
@@ -38,6 +42,9 @@ ILLEGAL_FUNCTION = 1
 OPENING_S = 0.5
 #: A PLC that was restarted has seen the last write after this time [s]: one cycle of its program.
 SCAN_S = 0.01
+
+#: A claim has to stand for so long [s]: longer than any program needs from finding a PLC free to its own claim.
+CLAIM_S = 0.15
 
 T = TypeVar("T")
 
@@ -137,6 +144,30 @@ class PlcBus:
             RateError: The period is too short for the line, or for the watchdog of the PLC.
         """
         return share_of_period(self._settings, self.info.limits.watchdog_ms, period_s)
+
+    def claim(self, setpoints_um: Sequence[int], vmax_um_s: int) -> None:
+        """Become the only one that writes, with control bits 0; takes ``CLAIM_S``. Nothing moves.
+
+        Args:
+            setpoints_um: Where the axes are (axes,) [um].
+            vmax_um_s: As in `exchange`.
+
+        Raises:
+            PlcTakenError: Another program has enabled the PLC, or writes to it too; at most one block was written.
+            LinkError: No valid answer.
+        """
+        self._liveness = Liveness()  # whatever HEARTBEAT others have written
+        if Status.ENABLED in self.read_status().status:
+            raise PlcTakenError("the drives are enabled")
+        self._counters = mine = Counters.drawn()
+        self._persist(
+            lambda attempt: self._send(self._blocks.command(mine, setpoints_um, Control(0), vmax_um_s))
+        )
+        time.sleep(CLAIM_S)
+        found = self._persist(lambda attempt: self._blocks.counters(self._read("command")))
+        if found != mine:
+            raise PlcTakenError(f"SEQ is {found.seq}, written was {mine.seq}")
+        self._liveness = Liveness()
 
     def exchange(self, setpoints_um: Sequence[int], control: Control, vmax_um_s: int) -> PlcStatus:
         """Send one set of set-points and get the state of the PLC.

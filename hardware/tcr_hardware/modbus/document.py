@@ -45,7 +45,7 @@ STATUS = {
     Status.REMOTE: "the PLC takes commands from this map",
     Status.IN_POSITION: "all drives stand at their set-points",
     Status.SLACK: "a cable is slack",
-    Status.DRIVE_COMM: "the field bus to the drives is down",
+    Status.DRIVE_COMM: "the field bus to the drives is down, or an encoder tells no position",
 }
 REJECT = {
     Reject.NONE: "none: the last set was taken",
@@ -60,7 +60,8 @@ FAULT = {
     FaultCode.WATCHDOG: "watchdog: `HEARTBEAT` did not change within `WD_MS` while operation was enabled",
     FaultCode.ESTOP: "estop: the e-stop was pressed",
     FaultCode.FOLLOWING_ERROR: "following error",
-    FaultCode.DRIVE: "drive: the field bus to the drives was down",
+    FaultCode.DRIVE: "drive: the field bus to the drives was down, or an encoder told no position",
+    FaultCode.CLOCK: "clock: the program measured no time between scans, so the watchdog could not work",
 }
 RULES = """\
 # Register map
@@ -85,7 +86,11 @@ since tension zero; positive pulls.
 4. Nothing starts by itself: after a fault `RESET`, after any stop a new edge of `ENABLE`.
 5. The drives hold their position in every state. Letting go of the cables would drop the robot.
 6. Set-points are spread evenly over the time between the last two sets (at most 0.1 s), never faster than `VMAX`.
-7. Only the command block may be written; other writes are answered with exception 2.
+7. After power-up the command block may hold what was written before. In the first scan `ENABLE` and `RESET` do not
+   rise, nor does `ZERO` if the zero is known: each has to be seen as 0 first, so nothing is enabled by itself.
+8. A host claims the PLC before it enables it: with all bits of `CTRL` 0 it writes a drawn number into `SEQ` and
+   another into `HEARTBEAT`, and goes on if both still stand there 0.15 s later. It claims no PLC that is enabled.
+9. Only the command block may be written; other writes are answered with exception 2.
 """
 
 

@@ -130,6 +130,21 @@ class StaleAnswerError(LinkError):
         self.echoed = echoed
 
 
+class PlcTakenError(HardwareError):
+    """Another program writes to the PLC; two would move one robot.
+
+    Attributes:
+        evidence: What gave it away.
+    """
+
+    def __init__(self, evidence: str) -> None:
+        super().__init__(
+            f"another program writes to the PLC: {evidence}",
+            hint="One program may move a robot: end the other one.",
+        )
+        self.evidence = evidence
+
+
 class PlcExceptionError(HardwareError):
     """The PLC refused a request with a Modbus exception.
 

@@ -74,6 +74,7 @@ class FaultCode(IntEnum):
     ESTOP = 2
     FOLLOWING_ERROR = 3
     DRIVE = 4
+    CLOCK = 5
 
 
 @dataclass(frozen=True, slots=True)

@@ -134,8 +134,9 @@ class NatNetClient:
 
     def statistics(self) -> Statistics:
         """Count what was received, lost and refused since ``open``."""
-        foreign = 0 if self._receiver is None else self._receiver.foreign
-        return Statistics.of(self._session, foreign, self._inbox.dropped, time.monotonic())
+        receiver = self._receiver
+        foreign, strangers = (0, 0) if receiver is None else (receiver.foreign, receiver.senders.strangers)
+        return Statistics.of(self._session, foreign, strangers, self._inbox.dropped, time.monotonic())
 
     def request(self, text: str, timeout_s: float = 1.0) -> bytes:
         """Ask the server something; return the payload of its answer.

@@ -83,7 +83,8 @@ class Suffix(NamedTuple):
     """What stands at the end of a frame.
 
     Attributes:
-        software_latency: From the last camera to sending [s]; None from 3.0 on.
+        software_latency: What the vendor's headers call so; None from 3.0 on. Motive writes the time of the frame
+            into it [s], so it says nothing about how old a frame is.
         timecode: SMPTE time code and sub-frame.
         timestamp: Time of the frame since the stream began [s]; None up to 2.5.
         mid_exposure: Server clock in the middle of the exposure [ticks]; 0 if unknown.

@@ -1,4 +1,4 @@
-"""FRAMEOFDATA, versions 2.5 to 4.3 [NN24]: sections in fixed order, then a suffix of fixed length.
+"""FRAMEOFDATA, versions 2.5 to 4.4 [NN24]: sections in fixed order, then a suffix of fixed length.
 
 ================  ============================================================  ======
 section           element                                                       since
@@ -14,7 +14,8 @@ force plates      id, n channels of n samples                                   
 devices           as force plates                                               2.11
 ================  ============================================================  ======
 
-Each section begins with the number of its elements and, from 4.1 on, the bytes that follow.
+Each section begins with the number of its elements and, from 4.1 on, the bytes that follow. From 4.1 to 4.4 nothing
+has changed.
 """
 
 from __future__ import annotations

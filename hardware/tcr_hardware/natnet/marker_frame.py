@@ -18,9 +18,11 @@ class MarkerFrame:
         sequence: Number of accepted frames before this one.
         arrival: When the packet was read from the socket.
         exposure: Middle of the exposure; None if the server does not tell or its clock is not yet known.
-        software_latency: From the arrival of the camera data at the server to sending [s]; None if not told.
+        software_latency: From the arrival of the camera data at the server to sending [s]; None if not told, as
+            always before 3.0.
         data: The frame as sent.
         models: Names that belong to it; None while the server has announced a change and not yet told the names.
+        doubt: Why nothing in it can be believed; empty if it can.
     """
 
     session: int
@@ -30,6 +32,7 @@ class MarkerFrame:
     software_latency: float | None
     data: MocapFrame
     models: ModelDefinitions | None
+    doubt: str = ""
 
     @property
     def number(self) -> int:

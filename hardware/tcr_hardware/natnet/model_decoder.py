@@ -1,7 +1,11 @@
-"""MODELDEF, versions 2.5 to 4.3 [NN24]: the names behind the numbers of a frame.
+"""MODELDEF, versions 2.5 to 4.4 [NN24]: the names behind the numbers of a frame.
 
 A list of descriptions in any order, each with its type and, from 4.1 on, its size in bytes. Only what names
 markers is kept; force plates, devices and cameras are read over.
+
+The size decides. A description that does not end there is tried in the other layout that has sizes, since a server
+that streams an older version may describe in its own. What is longer than both is read as far as it is known, if
+that gives names; else it is refused if it should name markers, and passed over if not. Nothing may follow the last.
 """
 
 from __future__ import annotations
@@ -10,12 +14,15 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from tcr_hardware.natnet.errors import MalformedPacketError
 from tcr_hardware.natnet.models import Description, MarkerName, ModelDefinitions
 from tcr_hardware.natnet.protocol import Version
 from tcr_hardware.natnet.reader import Reader
 
 #: Names in one packet: 200 rigid bodies of 8 markers are about 5000.
 MOST_NAMES = 6000
+#: From here on descriptions have sizes, and from there on rigid bodies an orientation against their parents.
+SIZED, TURNED = Version(4, 1), Version(4, 2)
 _BODY = struct.Struct("<ii3f")
 _PLATE = struct.Struct("<2f3f144f12f2i")
 _MARKER = struct.Struct("<i3ffh")
@@ -27,6 +34,16 @@ class _Found:
     cameras: list[str] = field(default_factory=list)
     skipped: list[int] = field(default_factory=list)
 
+    @property
+    def names(self) -> bool:
+        """Whether a marker has a name."""
+        return any(each.markers for each in self.descriptions)
+
+    def extend(self, other: _Found) -> None:
+        """Take over what was found in one description."""
+        self.descriptions += other.descriptions
+        self.cameras += other.cameras
+
 
 def decode_models(payload: bytes, version: Version) -> ModelDefinitions:
     """Decode the payload of MODELDEF.
@@ -36,18 +53,60 @@ def decode_models(payload: bytes, version: Version) -> ModelDefinitions:
             description whose size is not given.
     """
     reader, found = Reader(payload, MOST_NAMES), _Found()
-    for _ in range(reader.items("descriptions", 8 if version >= (4, 1) else 4)):
+    sized = version >= SIZED
+    for _ in range(reader.items("descriptions", 8 if sized else 4)):
         kind = reader.integer()
-        size = reader.integer() if version >= (4, 1) else None
-        read = _KINDS.get(kind)
-        if read is not None:
-            read(reader, version, found)
-        elif size is not None:
-            reader.skip(size)
-            found.skipped.append(kind)
+        if sized:
+            _sized(reader, kind, version, found)
+        elif kind in _KINDS:
+            _KINDS[kind](reader, version, found)
         else:
             raise reader.fail(f"unknown description type {kind}")
+    if reader.remaining:
+        raise reader.fail(f"{reader.remaining} bytes behind the last description")
     return ModelDefinitions(tuple(found.descriptions), tuple(found.cameras), tuple(found.skipped))
+
+
+def _sized(reader: Reader, kind: int, version: Version, found: _Found) -> None:
+    """Read one description of which the size is told."""
+    part = reader.part(reader.integer())
+    if kind not in _KINDS:
+        found.skipped.append(kind)
+    else:
+        _read_part(part, kind, version, found)
+    reader.resume(part)
+
+
+def _read_part(part: Reader, kind: int, version: Version, found: _Found) -> None:
+    """Read a description as its version has it, or as the other version with sizes.
+
+    Raises:
+        MalformedPacketError: It should name markers and ends elsewhere, without having named any.
+    """
+    entry, problem = _attempt(part, kind, version)
+    if problem is not None:
+        other, why_not = _attempt(part, kind, SIZED if version >= TURNED else TURNED)
+        if why_not is None or (other.names and not entry.names):
+            entry, problem = other, why_not
+    if problem is None or entry.names:
+        found.extend(entry)
+    elif kind in _NAMING:
+        raise problem
+    else:
+        found.skipped.append(kind)
+
+
+def _attempt(part: Reader, kind: int, layout: Version) -> tuple[_Found, MalformedPacketError | None]:
+    """Return what a description says in one layout, and why that cannot be all."""
+    reader, entry = part.part(part.remaining), _Found()
+    try:
+        _KINDS[kind](reader, layout, entry)
+    except MalformedPacketError as error:
+        return _Found(), error
+    problem = (
+        reader.fail(f"description of type {kind} ends at byte {reader.end}") if reader.remaining else None
+    )
+    return entry, problem
 
 
 def _marker_set(reader: Reader, version: Version, found: _Found) -> None:
@@ -64,7 +123,7 @@ def _rigid_body(reader: Reader, version: Version, found: _Found) -> None:
 def _body(reader: Reader, version: Version) -> Description:
     name = reader.text()
     body_id = reader.unpack(_BODY)[0]
-    if version >= (4, 2):
+    if version >= TURNED:
         reader.skip(16)  # orientation against the parent
     if version < (3, 0):
         return Description("rigid_body", name, body_id, ())
@@ -134,3 +193,5 @@ _KINDS: dict[int, Callable[[Reader, Version, _Found], None]] = {
     5: _camera,
     6: _asset,
 }
+#: Kinds without which markers would have no names.
+_NAMING = (0, 1, 6)

@@ -74,7 +74,9 @@ class Version(NamedTuple):
 
 
 OLDEST = Version(2, 5)
-NEWEST = Version(4, 3)
+NEWEST = Version(4, 4)
+#: Our own version in CONNECT: the newest whose requests are known.
+ANNOUNCED = Version(4, 3)
 #: What is asked of a server that is newer than ``NEWEST``: the newest layout proven against foreign decoders.
 PINNED = Version(4, 1)
 
@@ -131,6 +133,11 @@ def envelope(message: Message, payload: bytes = b"") -> bytes:
     return HEADER.pack(message, len(payload)) + payload
 
 
+def message_of(datagram: bytes) -> int | None:
+    """Return the message number of a datagram; None if it is too short to have one."""
+    return int.from_bytes(datagram[:2], "little") if len(datagram) >= HEADER.size else None
+
+
 def split(datagram: bytes) -> tuple[int, bytes]:
     """Take a datagram apart: message number (may be unknown) and payload.
 
@@ -147,7 +154,7 @@ def split(datagram: bytes) -> tuple[int, bytes]:
 
 def connect(bitstream: Version | None = None) -> bytes:
     """Ask the server to answer and, in unicast, to stream to us; 0.0 leaves the version to the server."""
-    sender = SENDER.pack(b"tcrctl", bytes(4), bytes((*NEWEST, 0, 0)))
+    sender = SENDER.pack(b"tcrctl", bytes(4), bytes((*ANNOUNCED, 0, 0)))
     wanted = bitstream or Version(0, 0)
     return envelope(Message.CONNECT, sender + CONNECT_OPTIONS.pack(0, *wanted, 0, 0))
 

@@ -117,6 +117,22 @@ class Reader:
         packed = np.frombuffer(self.buffer, np.uint8, count * size, start).reshape(count, size)
         return packed[:, : dtype.itemsize].copy().view(dtype.base).reshape(count, *dtype.shape)
 
+    def part(self, size: int) -> Reader:
+        """Return a reader of the next ``size`` bytes alone; this one stays where it is.
+
+        Raises:
+            MalformedPacketError: Negative or more than there are.
+        """
+        if not 0 <= size <= self.remaining:
+            raise self.fail(f"{size} bytes do not fit")
+        part = Reader(self.buffer, self._items)
+        part.offset, part.end = self.offset, self.offset + size
+        return part
+
+    def resume(self, part: Reader) -> None:
+        """Go on behind a part that was read."""
+        self.offset, self._items = part.end, part._items
+
     def skip(self, size: int) -> None:
         """Pass over ``size`` bytes.
 

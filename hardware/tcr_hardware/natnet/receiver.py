@@ -6,11 +6,13 @@ import selectors
 import socket
 import threading
 import time
+from dataclasses import replace
 
 from tcr_hardware.errors import HardwareError, SocketError
 from tcr_hardware.natnet import protocol
 from tcr_hardware.natnet.inbox import Inbox
 from tcr_hardware.natnet.protocol import LARGEST_DATAGRAM, Message
+from tcr_hardware.natnet.senders import Address, Senders
 from tcr_hardware.natnet.session import Session
 from tcr_hardware.natnet.sockets import Sockets
 
@@ -24,6 +26,7 @@ class Receiver:
 
     Attributes:
         foreign: Packets that came from another computer than the server.
+        senders: Where frames come from.
     """
 
     def __init__(self, sockets: Sockets, session: Session, inbox: Inbox, server: tuple[str, int]) -> None:
@@ -31,7 +34,7 @@ class Receiver:
         self._session = session
         self._inbox = inbox
         self._server = server
-        self.foreign = 0
+        self.foreign, self.senders = 0, Senders()
         session.last_problem = sockets.note
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="natnet", daemon=True)
@@ -84,21 +87,37 @@ class Receiver:
         """Take what has arrived at one socket."""
         for _ in range(BURST):
             try:
-                datagram, (host, _) = source.recvfrom(LARGEST_DATAGRAM)
+                datagram, sender = source.recvfrom(LARGEST_DATAGRAM)
             except BlockingIOError:
                 return
             except ConnectionError as error:  # an earlier request found nobody
                 self._unreachable(error)
                 continue
-            if host != self._server[0]:
-                self.foreign += 1
-                self._session.last_problem = f"packets from {host}, the server is {self._server[0]}"
-                continue
-            frame = self._session.receive(datagram, time.monotonic())
+            now = time.monotonic()
+            frame = self._session.receive(datagram, now) if self._admitted(datagram, sender, now) else None
             if frame is None:
                 self._inbox.notify()
             else:
-                self._inbox.put(frame)
+                self._inbox.put(replace(frame, doubt=self.senders.doubt(now)))
+
+    def _admitted(self, datagram: bytes, sender: Address, now: float) -> bool:
+        """Tell whether a packet comes from the server and, if it is a frame, from where the others came from."""
+        is_frame = protocol.message_of(datagram) == Message.FRAMEOFDATA
+        if sender[0] != self._server[0]:
+            self.foreign += 1
+            self._session.last_problem = f"packets from {sender[0]}, the server is {self._server[0]}"
+            if is_frame:
+                self.senders.object_to(sender, now)
+            return False
+        if not is_frame:
+            return True
+        before = self.senders.first
+        if not self.senders.admit(sender, now):
+            self._session.last_problem = "a second source of frames, {}:{}".format(*sender)
+            return False
+        if before not in (None, sender):
+            self._session.begin_anew()
+        return True
 
     def _unreachable(self, error: OSError) -> None:
         self._session.last_problem = "{}:{}: {}".format(*self._server, error.strerror or error)

@@ -46,6 +46,7 @@ class Session:
         frames: Frames accepted.
         early: Frames that came before the version was known.
         malformed: Packets that could not be read.
+        impossible: Frames whose clocks say something impossible; they are dated by their arrival.
         model_updates: Definitions received.
         last_problem: The newest complaint, for a person.
         failure: Why no frame of this server can be used, or None.
@@ -57,7 +58,7 @@ class Session:
         self.models: ModelDefinitions | None = None
         self.order, self.clock = FrameOrder(), ServerClock()
         self.choice = VersionChoice(settings)
-        self.frames = self.early = self.malformed = self.model_updates = 0
+        self.frames = self.early = self.malformed = self.impossible = self.model_updates = 0
         self.last_problem = ""
         self.failure: NatNetError | None = None
         self.on_response: Callable[[int, bytes], None] = lambda message, payload: None
@@ -120,6 +121,10 @@ class Session:
             self._echoes.append(client_ns)
             wanted.append(protocol.echo_request(client_ns))
         return wanted
+
+    def begin_anew(self) -> None:
+        """Take the next frame for the first of a new server, whose names and clock are not known."""
+        self.order.begin_anew()
 
     def next_due(self, now: float) -> float:
         """Return the seconds until ``due`` may have something to send."""
@@ -192,15 +197,28 @@ class Session:
             self._timers.now_due("models")
 
     def _on_our_clock(self, data: MocapFrame, now: float) -> MarkerFrame:
-        latency, suffix = data.suffix.software_latency, data.suffix
-        if latency is None and suffix.received and suffix.transmit and self.clock.hz:
+        """Date a frame; before 3.0 servers tell nothing from which its age could be known."""
+        suffix, exposure = data.suffix, self.clock.local(data.suffix.mid_exposure)
+        latency = None
+        if suffix.received and suffix.transmit and self.clock.hz:
             latency = (suffix.transmit - suffix.received) / self.clock.hz
-        exposure = self.clock.local(suffix.mid_exposure)
-        if exposure is not None:
-            latest = now + (self.clock.uncertainty(now) or 0.0)
-            if not now - LONGEST_LATENCY < exposure <= latest:
-                exposure, self.last_problem = None, "a frame was exposed at an impossible time"
-        return MarkerFrame(self.order.sessions, self.frames - 1, now, exposure, latency, data, self.models)
+        latest = now + (self.clock.uncertainty(now) or 0.0)
+        late = exposure is not None and not now - LONGEST_LATENCY < exposure <= latest
+        odd = latency is not None and not 0.0 <= latency < LONGEST_LATENCY
+        if late or odd:
+            self.impossible += 1
+            self.last_problem = "a frame was {} an impossible time".format(
+                "exposed at" if late else "at the server for"
+            )
+        return MarkerFrame(
+            self.order.sessions,
+            self.frames - 1,
+            now,
+            None if late else exposure,
+            None if odd else latency,
+            data,
+            self.models,
+        )
 
     def _echo(self, payload: bytes, now: float) -> None:
         client_ns, ticks = protocol.decode_echo(payload)

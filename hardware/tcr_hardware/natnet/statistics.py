@@ -19,7 +19,9 @@ class Statistics:
         undecided: Frames with an implausible number; not used.
         early: Frames that came before the version was known.
         malformed: Packets that could not be read.
+        impossible: Frames whose clocks say something impossible; dated by their arrival.
         foreign: Packets from another computer.
+        strangers: Frames of a second source; not used.
         sessions: How often the server began to count.
         model_updates: Definitions received.
         queue_dropped: Frames that nobody drained in time.
@@ -37,7 +39,9 @@ class Statistics:
     undecided: int
     early: int
     malformed: int
+    impossible: int
     foreign: int
+    strangers: int
     sessions: int
     model_updates: int
     queue_dropped: int
@@ -48,7 +52,7 @@ class Statistics:
     last_problem: str
 
     @classmethod
-    def of(cls, session: Session, foreign: int, queue_dropped: int, now: float) -> Statistics:
+    def of(cls, session: Session, foreign: int, strangers: int, queue_dropped: int, now: float) -> Statistics:
         """Read the counters of a session at ``now`` [s]."""
         order, clock = session.order, session.clock
         best = clock.best
@@ -60,7 +64,9 @@ class Statistics:
             undecided=order.undecided,
             early=session.early,
             malformed=session.malformed,
+            impossible=session.impossible,
             foreign=foreign,
+            strangers=strangers,
             sessions=order.sessions,
             model_updates=session.model_updates,
             queue_dropped=queue_dropped,

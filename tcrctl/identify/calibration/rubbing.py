@@ -54,14 +54,7 @@ class Rubbing(NamedTuple):
     error: float
     smooth_error: float
 
-    @property
-    def rubs(self) -> bool:
-        """Whether cables stick enough that a controller should dither from the first step on."""
-        return self.coefficient.size > 0 and float(self.coefficient.mean()) > STICKS
 
-
-#: Mean coefficient from which on dither is worth while before anything has stuck.
-STICKS: Final = 0.03
 NOTHING: Final = Rubbing(np.zeros(0), np.zeros(0), np.nan, np.nan)
 
 

@@ -41,6 +41,7 @@ class Health:
         laggard: Name of that cable.
         hopeless: The failed exchange says that waiting cannot help.
         refused: Set-points in a row that the PLC has not taken.
+        doubts: Why markers of the last frame could not be used, and how many.
     """
 
     age: float
@@ -51,3 +52,9 @@ class Health:
     laggard: str = ""
     hopeless: bool = False
     refused: int = 0
+    doubts: str = ""
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the drives are on, as far as is known."""
+        return self.status is not None and self.status.enabled

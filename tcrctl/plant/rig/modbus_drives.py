@@ -16,12 +16,13 @@ from tcr_hardware.modbus.errors import (
     MapError,
     PlcFrozenError,
     PlcMismatchError,
+    PlcTakenError,
     RateError,
 )
 from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status, register_map
 from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
 from tcrctl.config.settings import Settings
-from tcrctl.errors import DeviceError, InputError, UntrustworthyDeviceError
+from tcrctl.errors import ArmingRefusedError, DeviceError, InputError, UntrustworthyDeviceError
 from tcrctl.plant.rig.devices import DriveControl, DriveStatus
 from tcrctl.plant.rig.loopback import emulate_hint
 from tcrctl.plant.rig.settings import CableDrive, ModbusRtu, ModbusTcp, MountedRobot, SafetyRules
@@ -35,6 +36,10 @@ def address(mounted: MountedRobot) -> str:
     return f"PLC at {mounted.plc.place}"
 
 
+#: A PLC that acknowledges a block this far from ours acknowledges one of somebody else.
+FOREIGN: Final = 0x100
+#: So many calls in a row with answers that were not for us: no late answer of a serial line.
+STRANGE: Final = 3
 #: Section and link of every ``plc.kind``.
 LINKS: Final[Mapping[str, tuple[type[Settings], Callable[[Any], TcpLink | RtuLink]]]] = {
     "modbus_tcp": (ModbusTcp, lambda plc: TcpLink(plc.host, plc.port)),
@@ -101,6 +106,8 @@ class ModbusDrives:
             self.bus.close()
             raise
         self._last: DriveStatus | None = None
+        self._mine: bool | None = None  # not known before the first exchange
+        self._strange = self._stale = 0
 
     def check(self, rules: SafetyRules, period: float) -> float:
         """Hold the rig file against the PLC's own limits; return the share of the period that the line is busy.
@@ -137,17 +144,51 @@ class ModbusDrives:
         """Read the status; over a serial line, where that costs wire time, what the last exchange said."""
         if self._last is not None and not self._asks:
             return self._last
-        return self._translated(self._call(self.bus.read_status, moving=True))
+        return self._translated(self._asked(self.bus.read_status))
 
     def exchange(self, target: NDArray[np.int64], control: DriveControl) -> DriveStatus:
-        """Send one block and get the status; axes without a cable stay where the PLC says they are."""
+        """Send one block and get the status; axes without a cable stay where the PLC says they are.
+
+        The first one that wants something claims the PLC. If another program has it, nothing is ever written.
+
+        Raises:
+            ArmingRefusedError: If another program writes to the PLC.
+            DeviceError: If it does not answer.
+        """
+        if self._mine is None and control != DriveControl():
+            self._claim()
+        if not self._mine:
+            return self.status()
         block = list(self._raw)
         for axis, value in zip(self._axes, self._signs * target, strict=True):
             block[axis] = int(value)
         bits = _bits(control)
-        answer = self._call(lambda: self.bus.exchange(block, bits, self._speed), moving=True)
+        answer = self._asked(lambda: self.bus.exchange(block, bits, self._speed))
         self._last = self._translated(answer)
         return self._last
+
+    def _asked(self, action: Callable[[], Any]) -> Any:
+        """Do something while the drives may move, and notice who else speaks to the PLC.
+
+        Raises:
+            UntrustworthyDeviceError: If answers to somebody else have come ``STRANGE`` times in a row.
+            DeviceError: If there is no good answer.
+        """
+        try:
+            return self._call(action, moving=True)
+        finally:
+            stale = self.bus.statistics.stale_answers
+            self._strange, self._stale = self._strange + 1 if stale > self._stale else 0, stale
+            if self._mine and self._strange >= STRANGE:
+                raise UntrustworthyDeviceError(f"{self._where}: another program writes to it")
+
+    def _claim(self) -> None:
+        try:
+            self._call(lambda: self.bus.claim(self._raw, self._speed), moving=True)
+        except ArmingRefusedError:
+            self._mine = False
+            raise
+        self._mine = True
 
     def close(self) -> None:
         """End the connection."""
@@ -163,6 +204,8 @@ class ModbusDrives:
             raise InputError(f"{self._where}: {error}", hint=error.hint) from error
         except _HOPELESS as error:
             raise UntrustworthyDeviceError(f"{self._where}: {error}", hint=error.hint) from error
+        except PlcTakenError as error:
+            raise ArmingRefusedError([f"{self._where}: {error}"], hint=error.hint) from error
         except HardwareError as error:
             hint = emulate_hint(self._where) or error.hint
             raise DeviceError(f"{self._where}: {error}", hint=hint) from error
@@ -170,6 +213,10 @@ class ModbusDrives:
     def _translated(self, answer: Any) -> DriveStatus:
         self._raw = list(answer.positions_um)
         bits, refused = answer.status, answer.reject is not Reject.NONE
+        if self._mine and Status.ENABLED in bits and answer.ack_lag >= FOREIGN:
+            raise UntrustworthyDeviceError(
+                f"{self._where}: another program writes to it, SEQ {answer.seq_ack}, ours is {answer.seq}"
+            )
         return DriveStatus(
             position=self._signs * np.array(answer.positions_um, dtype=np.int64)[self._axes],
             enabled=Status.ENABLED in bits,

@@ -88,9 +88,8 @@ class RigPlant:
         self._period, self._operation, self._clock, self._sleep = period, operation, clock, sleep
         self.supervisor = Supervisor(limits.rules, operation.report)
         self._points: SetPoints | None = None
-        self._refused = 0
         self._seen: Sighting | None = None
-        self._usable_at = -np.inf
+        self._refused, self._usable_at = 0, -np.inf
         self._clamps, self._doubts = ClampNotes(operation.report), DoubtNotes(operation.report, clock)
 
     # --- the loop ---
@@ -151,8 +150,10 @@ class RigPlant:
             ArmingRefusedError: If a condition is not met; nothing has moved.
             DeviceError: If the drives are lost.
         """
-        self.supervisor.check_ready(self.look(), confirmed=self._operation.confirmed)
+        health = self.look()
+        self.supervisor.check_ready(health, confirmed=self._operation.confirmed, taken=health.enabled)
         self.arm(f"operator agreed; measurement {1e3 * self._health().age:.0f} ms old")
+        self._measurement(self._frame())  # arming takes longer than a measurement stays fresh
 
     def arm(self, cause: str) -> None:
         """Switch the drives on and wait until they are; see :meth:`start`, which also looks at the cameras."""
@@ -230,8 +231,7 @@ class RigPlant:
         while self.supervisor.state is SafetyState.STOPPING:
             self._line.exchange(self.position(), self.supervisor.control)
             answered, now = self._line.ask(), self.position()
-            moved = before is None or bool(np.any(np.abs(now - before) > STILL))
-            before = now
+            moved, before = before is None or bool(np.any(np.abs(now - before) > STILL)), now
             health = replace(self._health(), silence=0.0) if answered else self._health()
             if self.supervisor.rest(self._clock(), health, moved=moved) is SafetyState.STOPPING:
                 self._sleep(CYCLE)
@@ -291,6 +291,7 @@ class RigPlant:
             laggard=laggard,
             hopeless=self._line.hopeless,
             refused=self._refused,
+            doubts="" if self._seen is None else self._seen.doubts,
         )
 
     def _supervise(self) -> None:

@@ -103,17 +103,19 @@ class Supervisor:
         """Whether the drives are on because of this program."""
         return self.state in (*_MOVING, SafetyState.ZEROING, SafetyState.STOPPING)
 
-    def check_ready(self, health: Health, *, confirmed: bool) -> None:
+    def check_ready(self, health: Health, *, confirmed: bool, taken: bool = False) -> None:
         """Find out whether the drives may be armed.
 
         Args:
             health: What is known now.
             confirmed: The operator has agreed.
+            taken: Another program has enabled them.
 
         Raises:
             ArmingRefusedError: With every condition that is not met.
         """
         reasons = list(_refusals(health, self._rules))
+        reasons += ["the drives are enabled by somebody else"] if taken else []
         if not confirmed:
             reasons.append("the operator has not agreed (--yes)")
         if self.state is not SafetyState.DISARMED:
@@ -205,6 +207,7 @@ class Supervisor:
         if health.age >= rules.stale_stop:
             return RigStopError(
                 f"no usable measurement for {1e3 * health.age:.0f} ms, limit {1e3 * rules.stale_stop:.0f} ms"
+                f"{_doubts(health)}"
             )
         if health.following > rules.following or (status is not None and status.following_error):
             return RigStopError(
@@ -247,10 +250,14 @@ def _doubt(health: Health, rules: Rules) -> str:
     if health.trouble:
         return f"no answer of the drives: {health.trouble}"
     if health.age >= rules.stale:
-        return f"no usable measurement for {1e3 * health.age:.0f} ms"
+        return f"no usable measurement for {1e3 * health.age:.0f} ms{_doubts(health)}"
     if health.refused and health.status is not None:
         return f"the PLC refused a set-point: {_refusal(health.status)}"
     return ""
+
+
+def _doubts(health: Health) -> str:
+    return f"; markers that cannot be used: {health.doubts}" if health.doubts else ""
 
 
 def _refusal(status: DriveStatus) -> str:
@@ -271,7 +278,7 @@ def _refusals(health: Health, rules: Rules) -> list[str]:
     if not status.acknowledged:
         reasons.append("the PLC does not acknowledge")
     if health.age == math.inf:
-        reasons.append("the cameras have shown no usable measurement")
+        reasons.append(f"the cameras have shown no usable measurement{_doubts(health)}")
     elif not health.age < rules.stale:
-        reasons.append(f"the newest usable measurement is {1e3 * health.age:.0f} ms old")
+        reasons.append(f"the newest usable measurement is {1e3 * health.age:.0f} ms old{_doubts(health)}")
     return reasons

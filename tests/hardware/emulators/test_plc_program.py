@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tcr_hardware.emulators.plc_program import PlcCommand, PlcLimitSettings, PlcProgram
+from tcr_hardware.emulators.plc_command import PlcCommand
+from tcr_hardware.emulators.plc_limits import PlcLimitSettings
+from tcr_hardware.emulators.plc_program import PlcProgram
 from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status
 from tcr_hardware.servo import Servo, ServoSettings
 
@@ -119,8 +121,8 @@ def test_a_stop_slows_down_with_the_deceleration_set():
 @pytest.mark.parametrize(
     ("setpoints", "vmax", "verdict"),
     [
-        ((60_001.0, 0.0), 50_000.0, (Reject.RANGE, 1)),
-        ((0.0, -60_001.0), 50_000.0, (Reject.RANGE, 2)),
+        ((95_001.0, 0.0), 50_000.0, (Reject.RANGE, 1)),
+        ((0.0, -35_001.0), 50_000.0, (Reject.RANGE, 2)),
         ((0.0, 6_001.0), 50_000.0, (Reject.STEP, 2)),
         ((100.0, 100.0), 0.0, (Reject.SPEED, 0)),
         ((100.0, 100.0), 100_100.0, (Reject.SPEED, 0)),
@@ -292,3 +294,28 @@ def test_play_keeps_the_cable_still_when_the_drive_turns_round():
     for _ in range(300):
         servo.advance(700.0, DT)
     assert servo.output == pytest.approx(800.0, abs=1.0)
+
+
+@pytest.mark.parametrize("dt", [0.0, -DT, float("nan")])
+def test_a_scan_that_takes_no_time_moves_nothing_and_spoils_nothing(dt):
+    host = Host().following()
+    host.send(FOLLOW, 3_000.0, -3_000.0, scans=10)
+    active, positions = list(host.plc.active), host.plc.positions()
+    for _ in range(5):
+        host.plc.scan(host.command, dt)
+    assert (host.plc.active, host.plc.positions()) == (active, positions)
+    host.send(Control.ENABLE, scans=1)  # the speed is remembered: it is brought to rest on a ramp
+    assert Status.STOPPING in host.plc.status()
+    host.wait(200)
+    assert 0.0 < host.plc.active[0] - active[0] < 1_000.0
+    assert host.plc.positions() == pytest.approx(host.plc.active, abs=1.0)
+
+
+def test_a_program_that_starts_under_a_host_that_goes_on_waits_until_enable_was_0():
+    host = Host().following()
+    host.plc.power_up()
+    for k in range(5):
+        host.send(FOLLOW, 1_000.0 * k, 0.0)
+    assert (host.plc.enabled, host.plc.active) == (False, [0.0, 0.0])
+    host.send(Control.RUN)
+    assert host.send(ON).enabled

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from dataclasses import replace
@@ -10,7 +11,7 @@ import pytest
 
 from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_faults import FAULTS, UnknownFaultError
-from tcr_hardware.emulators.plc_program import PlcLimitSettings
+from tcr_hardware.emulators.plc_limits import PlcLimitSettings
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.modbus.bus import PlcBus
 from tcr_hardware.modbus.errors import (
@@ -26,7 +27,7 @@ from tcr_hardware.modbus.errors import (
     StaleAnswerError,
     WrongEchoError,
 )
-from tcr_hardware.modbus.registers import Control, Reject, Status, register_map
+from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status, register_map
 from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
 
 ON = Control.ENABLE | Control.RUN
@@ -101,8 +102,8 @@ def test_opening_finds_the_limits_and_writes_nothing(plc, wire):
     with PlcBus(settings_for(plc, wire)) as bus:
         limits = bus.info.limits
     assert (limits.watchdog_ms, limits.step_max_um, limits.vmax_um_s) == (3000, 6000, 100_000)
-    assert limits.min_um == (-60_000,) * 6
-    assert limits.max_um == (60_000,) * 6
+    assert limits.min_um == (-35_000,) * 6
+    assert limits.max_um == (95_000,) * 6
     assert Status.READY in bus.info.status.status
     assert plc.read(0, 16) == [0] * 16
 
@@ -502,3 +503,34 @@ def test_the_emulator_leaves_no_thread_behind():
         bus.exchange(STILL, Control.RUN, SPEED)
     bus.close()
     assert eventually(lambda: threading.active_count() == before)
+
+
+@pytest.mark.slow
+def test_a_plc_whose_registers_survive_a_power_cycle_enables_nothing(bus, plc):
+    settle(bus, STILL, ON)
+    settle(bus, STILL, FOLLOW)
+    plc.faults.set("restart", keep=1)
+    assert plc.read(0, 1) == [int(FOLLOW)]
+    time.sleep(0.05)
+    assert Status.ENABLED not in plc.snapshot()["status"]
+    for _ in range(5):
+        with contextlib.suppress(LinkError):
+            bus.exchange((1_000,) * 6, FOLLOW, SPEED)
+        time.sleep(0.02)
+    assert Status.ENABLED not in plc.snapshot()["status"]
+    assert plc.positions_um() == pytest.approx((0.0,) * 6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "arguments", "code"),
+    [("dead_clock", {}, FaultCode.CLOCK), ("encoder", {"axis": 3}, FaultCode.DRIVE)],
+)
+def test_a_plc_without_a_clock_or_an_encoder_stops_and_says_why(bus, plc, fault, arguments, code):
+    settle(bus, STILL, ON)
+    settle(bus, STILL, FOLLOW)
+    plc.faults.set(fault, **arguments)
+    end = time.monotonic() + 20.0
+    while Status.ENABLED in bus.exchange(STILL, FOLLOW, SPEED).status and time.monotonic() < end:
+        time.sleep(0.02)
+    assert (plc.snapshot()["fault"], Status.ENABLED in plc.snapshot()["status"]) == (code, False)

@@ -62,7 +62,7 @@ GOLDEN = {
     ],
 }  # fmt: skip
 GOLDEN[(3, 1)] = GOLDEN[(4, 0)] = GOLDEN[(3, 0)]
-GOLDEN[(4, 2)] = GOLDEN[(4, 3)] = GOLDEN[(4, 1)]
+GOLDEN[(4, 2)] = GOLDEN[(4, 3)] = GOLDEN[(4, 4)] = GOLDEN[(4, 1)]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -399,6 +399,60 @@ def test_an_unknown_description_is_skipped_if_its_size_is_told():
     assert models.skipped == (9,)
     with pytest.raises(MalformedPacketError, match="unknown description type 9"):
         decode_models(wire.models_payload((4, 0), [(9, b"?" * 17), known]), Version(4, 0))
+
+
+def three_rings(version):
+    return [(1, wire.body_description(version, f"m{k}", k, [f"n{i}" for i in (1, 2, 3)])) for k in (1, 2, 3)]
+
+
+NINE = {f"m{k}.n{i}": k << 16 | i for k in (1, 2, 3) for i in (1, 2, 3)}
+
+
+@pytest.mark.parametrize(("described", "read"), [((4, 2), (4, 1)), ((4, 3), (4, 1)), ((4, 1), (4, 2))])
+def test_definitions_in_the_layout_of_another_version_lose_no_marker(described, read):
+    """A server that is asked for an older bit stream may describe in its own."""
+    kinds = [
+        *three_rings(described),
+        (2, wire.skeleton_description(described, "Fred", 3)),
+        (6, wire.asset_description(described, "tail", 7, [(1, "t1")])),
+    ]
+    models = decode_models(wire.models_payload((4, 1), kinds), Version(*read))
+    assert models.labels() == {**NINE, "tail.t1": 7 << 16 | 1}
+    assert models.skipped == ()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("more", [b"\0" * 40, b"\0", wire.name("m1")])
+def test_nothing_may_follow_the_last_definition(version, more):
+    with pytest.raises(MalformedPacketError, match="behind the last description"):
+        decode_models(every_description(version) + more, Version(*version))
+
+
+@pytest.mark.parametrize("version", [(4, 1), (4, 3), (4, 4), (4, 5), (5, 0)])
+@pytest.mark.parametrize("kind", range(7))
+def test_a_description_that_is_longer_than_known_is_read_as_far_as_it_is_known(version, kind):
+    written = min(version, (4, 4))
+    made = {
+        0: wire.set_description("base", ["n1"]),
+        1: wire.body_description(written, "base", 12, ["n1"]),
+        2: wire.skeleton_description(written, "Fred", 3),
+        3: wire.plate_description(),
+        4: wire.device_description(),
+        5: wire.camera_description("Cam 1"),
+        6: wire.asset_description(written, "tail", 7, [(1, "t1")]),
+    }
+    kinds = [(kind, made[kind] + b"\1\2\3\4\5\6\7\x08"), *three_rings(written)]
+    models = decode_models(wire.models_payload(written, kinds), Version(*version))
+    named = {1: {"base.n1": 12 << 16 | 1}, 6: {"tail.t1": 7 << 16 | 1}}.get(kind, {})
+    assert models.labels() == {**named, **NINE}
+
+
+def test_a_description_that_ends_early_without_having_named_a_marker_is_refused():
+    """Numbers that are read at the wrong place may say: no markers."""
+    body = wire.body_description((4, 1), "base", 12, [])
+    for version in ((4, 1), (4, 2), (4, 4)):
+        with pytest.raises(MalformedPacketError, match="description of type 1 ends"):
+            decode_models(wire.models_payload((4, 1), [(1, body + b"\0" * 24)]), Version(*version))
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from tcr_hardware.errors import HardwareError, SocketError
 from tcr_hardware.natnet.client import NatNetClient
 from tcr_hardware.natnet.errors import RequestRefusedError, ServerSilentError, UnsupportedVersionError
 from tcr_hardware.natnet.frame import MODELS_CHANGED
+from tcr_hardware.natnet.senders import Senders
 from tcr_hardware.natnet.settings import NatNetSettings
 
 NAMES = [f"m{i}.n{j}" for i in (1, 2) for j in (1, 2, 3)]
@@ -177,11 +178,11 @@ def test_an_address_that_does_not_exist_is_an_error_at_once(wrong):
 
 def test_a_newer_server_is_refused_in_multicast_and_pinned_in_unicast():
     with (
-        serve(version="4.4", multicast=True) as motive,
+        serve(version="4.5", multicast=True) as motive,
         pytest.raises(UnsupportedVersionError, match=r"4\.4"),
     ):
         client_of(motive).open()
-    with linked(version="4.4") as (_, client):
+    with linked(version="4.5") as (_, client):
         assert str(client.version) == "4.1"
         frames(client, 3)
 
@@ -274,6 +275,7 @@ def test_a_frozen_stream_grows_old():
         assert client.wait_next(frozen, 2.0) is not None
 
 
+@pytest.mark.slow
 def test_a_restarted_server_is_found_again_in_unicast_and_multicast():
     for way in (WAYS[0], WAYS[2].values[0] if multicast_works() else WAYS[1]):
         with linked({"silence_s": 0.2}, **way) as (motive, client):
@@ -370,3 +372,53 @@ def test_packets_of_another_computer_are_not_believed():
             stranger.sendto(motive.latest((4, 1)), ("127.0.0.1", port))
         eventually(lambda: client.statistics().foreign == 1)
         assert "127.0.0.2" in client.statistics().last_problem
+
+
+@pytest.mark.slow
+def test_a_second_source_of_frames_makes_both_doubtful_until_it_is_gone():
+    """One port of the server's computer is its own; whoever sends from another may be anybody."""
+    for way in ({"multicast": False}, {"multicast": True}):
+        with linked(**way) as (motive, client):
+            assert all(not frame.doubt for frame in frames(client, 5))
+            motive.faults.second_source = 1.0
+            eventually(lambda client=client: client.newest().doubt)
+            client.drain()  # some are of before
+            assert all(frame.doubt for frame in frames(client, 20))
+            assert client.statistics().strangers >= 10
+            assert "second source" in client.statistics().last_problem
+            motive.faults.second_source = 0.0
+            eventually(lambda client=client: not client.newest().doubt)
+
+
+def test_one_frame_of_another_computer_is_not_used_and_makes_the_others_doubtful_for_a_moment():
+    with linked() as (motive, client):
+        last = frames(client, 2)[-1]
+        port = client._receiver._sockets.command.getsockname()[1]
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.bind(("127.0.0.2", 0))
+            stranger.sendto(motive.latest((4, 1)), ("127.0.0.1", port))
+        eventually(lambda: client.newest().doubt)
+        eventually(lambda: not client.newest().doubt)
+        assert client.newest().session == last.session
+        assert client.statistics().strangers == 1
+
+
+def test_a_server_that_comes_back_at_another_port_is_followed():
+    senders = Senders()
+    assert senders.admit(("10.0.0.1", 1511), 0.0)
+    assert not senders.admit(("10.0.0.1", 4000), 0.5)
+    assert senders.doubt(0.5)
+    assert not senders.doubt(0.7)
+    assert senders.admit(("10.0.0.1", 4000), 1.1)
+    assert not senders.admit(("10.0.0.1", 1511), 1.2)
+
+
+def test_a_stranger_that_goes_on_is_doubted_for_longer():
+    senders = Senders()
+    for k in range(40):
+        senders.admit(("10.0.0.1", 1511), 0.1 * k)
+        senders.admit(("10.0.0.1", 4000), 0.1 * k)
+    assert senders.doubt(5.0)
+    assert not senders.doubt(5.6)
+    senders.admit(("10.0.0.1", 4000), 9.0)  # the first one has been silent for long: no stranger any more
+    assert not senders.doubt(9.0)

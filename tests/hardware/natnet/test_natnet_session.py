@@ -116,7 +116,7 @@ def test_a_server_newer_than_the_client_is_asked_for_4_1_in_unicast():
 @pytest.mark.parametrize(
     ("settings", "version"),
     [
-        (MULTICAST, (4, 4)),
+        (MULTICAST, (4, 5)),
         (MULTICAST, (5, 0)),
         (MULTICAST, (2, 4)),
         (UNICAST, (2, 4)),
@@ -134,9 +134,9 @@ def test_versions_that_cannot_be_read_are_refused_by_name(settings, version):
 
 def test_a_newer_version_is_read_when_allowed():
     session = Session(NatNetSettings(multicast=True, allow_newer=True), 0.0)
-    server = Server((4, 4))
+    server = Server((4, 5))
     now = talk(session, server, 0.0)
-    assert session.version == (4, 4)
+    assert session.version == (4, 5)
     assert session.receive(server.frame(now, version=(4, 3)), now) is not None
 
 
@@ -312,6 +312,29 @@ def test_a_frame_from_an_impossible_time_is_dated_by_its_arrival(exposed_s_ago):
     frame = session.receive(wire.packet(FRAME, wire.frame_payload((4, 1), content)), now)
     assert frame.exposure is None
     assert frame.age(now) == 0.0
+    assert session.impossible == 1
+
+
+@pytest.mark.parametrize("field", [775.3, 3427.1, 98527.4, 0.02, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("version", [each for each in VERSIONS if each < (3, 0)])
+def test_the_age_of_an_old_servers_frame_counts_from_its_arrival(version, field):
+    """What the vendor's headers call a latency is a time stamp, in real frames of 2.5, 2.7 and 2.9."""
+    session, server = Session(UNICAST, 0.0), Server(version)
+    now = talk(session, server, 0.0)
+    content = Wire(number=1, latency=field, timestamp=field)
+    frame = session.receive(wire.packet(FRAME, wire.frame_payload(version, content)), now)
+    assert frame.age(now + 0.03) == pytest.approx(0.03)
+    assert (frame.software_latency, session.impossible) == (None, 0)
+
+
+@pytest.mark.parametrize(("received", "transmit"), [(5, 4), (1, 2**63), (2**63, 1)])
+def test_a_frame_that_was_at_the_server_for_an_impossible_time_is_dated_by_its_arrival(received, transmit):
+    session, server = Session(UNICAST, 0.0), Server((4, 1))
+    now = talk(session, server, 0.0)
+    content = Wire(number=1, ticks=(0, received, transmit))
+    frame = session.receive(wire.packet(FRAME, wire.frame_payload((4, 1), content)), now)
+    assert (frame.software_latency, frame.age(now)) == (None, 0.0)
+    assert session.impossible == 1
 
 
 def test_a_message_of_the_server_is_shown():
