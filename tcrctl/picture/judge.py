@@ -25,7 +25,7 @@ from tcrctl.picture.limits import Shares, joint_shares, limits_in_motion, side_s
 from tcrctl.picture.notes import PictureNotes
 from tcrctl.picture.settings import PictureSettings
 from tcrctl.picture.shape import Shape, anatomy_of, median_shape, shape_of
-from tcrctl.picture.suspects import Verdict, wrong_markers, wrong_rings
+from tcrctl.picture.suspects import Verdict, judge_joints, wrong_markers, wrong_rings
 from tcrctl.robot.module import RING
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Measurement
@@ -88,8 +88,9 @@ class PictureJudge:
         verdict = self._verdict(nodes, measured, shape)
         self._out, self._frame_out = verdict.out, verdict.frame
         left = int(np.count_nonzero(seen & ~verdict.out))
-        needed = self._settings.least_share * np.count_nonzero(seen)
-        self._doubt(verdict, few=verdict.frame or bool(left < needed))
+        least = self._settings.least_share
+        few = left < least * np.count_nonzero(seen) or 1.0 - verdict.strange < least
+        self._doubt(verdict, few=verdict.frame or bool(few))
         if not verdict.out.any():
             return measured
         return replace(measured, valid=seen & ~verdict.out)
@@ -107,7 +108,6 @@ class PictureJudge:
         again = np.where(rings_out, BACK, 1.0)
         self._start = Shape(*(np.where(np.isnan(a), b, a) for a, b in zip(self._start, shape, strict=True)))
         change = shape.since(self._start)
-        wrong_markers(verdict, side_shares(change, self._limits, self._noise) / again[:, None])
         above = np.concatenate([[BACK if self._frame_out else 1.0], again[:-1]])
         joints = np.minimum(again, above)
 
@@ -115,6 +115,9 @@ class PictureJudge:
             now = change if not out.any() else shape_of(self._anatomy, nodes, seen & ~out).since(self._start)
             return joint_shares(now, self._limits, self._noise).over(joints)
 
+        worst = look(verdict.out).worst
+        judge_joints(verdict, worst)
+        wrong_markers(verdict, side_shares(change, self._limits, self._noise) / again[:, None], worst)
         wrong_rings(verdict, look)
         return verdict
 

@@ -117,7 +117,7 @@ def _suspects(
         return joint_shares(seen.since(model), limits, 0.0)
 
     change = shape_of(anatomy, picture.markers, picture.seen).since(model)
-    wrong_markers(verdict, side_shares(change, limits, 0.0))
+    wrong_markers(verdict, side_shares(change, limits, 0.0), joint_shares(change, limits, 0.0).worst)
     sized = picture.seen & ~verdict.out
     wrong_rings(verdict, look)
     return verdict, sized

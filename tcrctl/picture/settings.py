@@ -36,7 +36,7 @@ class PictureSettings(Settings):
     )
     least_share: float = quantity(
         "1",
-        "the drives are held if a smaller share of the markers that are seen is believed",
+        "the drives are held if a smaller share of the markers, or of the joints between rings, is believed",
         0.5,
         gt=0,
         le=1,

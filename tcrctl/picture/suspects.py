@@ -55,28 +55,40 @@ class Verdict:
     Attributes:
         out: Markers (3 n,).
         frame: The frame of the cameras itself.
+        strange: Share of the joints that have changed by more than they can, of those that are seen.
         suspects: Why.
     """
 
     out: NDArray[np.bool_]
     frame: bool = False
+    strange: float = 0.0
     suspects: list[Suspect] = field(default_factory=list)
 
 
-def wrong_markers(verdict: Verdict, shares: Array) -> None:
+def wrong_markers(verdict: Verdict, shares: Array, joints: Array) -> None:
     """Leave out markers whose ring has changed its size.
 
     Args:
         verdict: Is added to.
         shares: Changes of sides as shares of their limits (n, 3).
+        joints: The largest change of every joint as a share of its limit (n,); 0 where nothing is known.
     """
     for ring in np.flatnonzero((shares > 1.0).any(axis=1)).tolist():
-        node = _loose_marker(shares[ring])
+        node = None if _elsewhere(joints, ring, shares[ring].max()) else _loose_marker(shares[ring])
         out = [0, 1, 2] if node is None else [node]
         verdict.out[[RING * ring + i for i in out]] = True
         name = f"ring {ring + 1}" if node is None else f"marker m{ring + 1}.n{node + 1}"
         why = f"sides of ring {ring + 1} have changed by {shares[ring].max():.1f} times their limit"
         verdict.suspects.append(Suspect(name, why, ring + 1))
+
+
+def _elsewhere(joints: Array, ring: int, size: float) -> bool:
+    """Return whether a ring is not where it was, in all its joints, by more than a loose marker of it explains.
+
+    A marker that changes a side by some millimetres moves the centre of its ring by fewer.
+    """
+    known = [joint for joint in joints[ring : ring + 2] if joint > 0.0]
+    return bool(known) and min(known) > 1.0 + size
 
 
 def _loose_marker(sides: Array) -> int | None:
@@ -89,6 +101,11 @@ def _loose_marker(sides: Array) -> int | None:
     less, more = np.sort(np.delete(apart, node))
     alone = apart[node] < ALONE * less and less > BOTH * more and np.count_nonzero(sides) == RING
     return node if alone else None
+
+
+def judge_joints(verdict: Verdict, worst: Array) -> None:
+    """Say how many joints are strange: if most are, what is left when rings are left out agrees by chance."""
+    verdict.strange = float(np.count_nonzero(worst > 1.0)) / max(1, np.count_nonzero(worst > 0.0))
 
 
 def wrong_rings(verdict: Verdict, look: Callable[[NDArray[np.bool_]], Shares]) -> None:
