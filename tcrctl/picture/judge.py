@@ -21,10 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.errors import PictureError
-from tcrctl.picture.limits import Shares, joint_shares, limits_in_motion, side_shares
+from tcrctl.picture.kernel import typical_change
+from tcrctl.picture.limits import limits_in_motion
 from tcrctl.picture.notes import PictureNotes
 from tcrctl.picture.settings import PictureSettings
-from tcrctl.picture.shape import Shape, anatomy_of, median_shape, shape_of
+from tcrctl.picture.shape import Shape, anatomy_of, completed, median_shape, shape_of
+from tcrctl.picture.shares import Shares, is_strange, joint_shares, side_shares
 from tcrctl.picture.suspects import Verdict, judge_joints, wrong_markers, wrong_rings
 from tcrctl.robot.module import RING
 from tcrctl.robot.robot import Robot
@@ -77,7 +79,7 @@ class PictureJudge:
         for measured in start:
             shapes.append(shape_of(self._anatomy, measured.nodes.astype(float), measured.valid))
             self._listen(measured.t, shapes[-1].side)
-        self._start = median_shape(shapes)
+        self._start, self._unknown = median_shape(shapes), True
         self._blend = -float(np.expm1(-period / FILTER))
 
     def judged(self, measured: Measurement) -> Measurement:
@@ -104,9 +106,14 @@ class PictureJudge:
     def _verdict(self, nodes: Array, measured: Measurement, shape: Shape) -> Verdict:
         """Return what is not believed; nearly always nothing, which one look tells."""
         verdict, seen = Verdict(np.zeros_like(self._out)), measured.valid
+        if self._unknown:
+            self._start = completed(self._start, shape)
+            self._unknown = any(np.isnan(part).any() for part in self._start)
+        well = not self._frame_out and not self._out.any()
+        if well and not is_strange(self._start, shape, self._limits, self._noise):
+            return verdict
         rings_out = self._out.reshape(-1, RING).any(axis=1)
         again = np.where(rings_out, BACK, 1.0)
-        self._start = Shape(*(np.where(np.isnan(a), b, a) for a, b in zip(self._start, shape, strict=True)))
         change = shape.since(self._start)
         above = np.concatenate([[BACK if self._frame_out else 1.0], again[:-1]])
         joints = np.minimum(again, above)
@@ -126,11 +133,9 @@ class PictureJudge:
         before, self._last = self._last, (t, side)
         if t == before[0]:
             return
-        change = np.abs(side - before[1])
-        known = change[~np.isnan(change)]
-        if known.size:
-            noise = float(np.median(known)) / (MEDIAN * TWO_FRAMES)
-            self._noise += self._blend * (noise - self._noise)
+        change = typical_change(side, before[1])
+        if not np.isnan(change):
+            self._noise += self._blend * (change / (MEDIAN * TWO_FRAMES) - self._noise)
 
     def _doubt(self, verdict: Verdict, *, few: bool) -> None:
         self._held = self._held + 1 if few else 0

@@ -61,3 +61,11 @@ def _axes(ring: Array) -> Array:
     axes[0], axes[2] = x / norm(x), z / norm(z)
     axes[1] = cross(axes[2], axes[0])
     return axes
+
+
+@njit(cache=True, error_model="numpy")
+def typical_change(now: Array, before: Array) -> float:
+    """Return the median of how much values (n, 3) have changed, of those that are known; NaN if none is."""
+    change = np.abs(now - before).ravel()
+    known = change[change == change]
+    return float(np.median(known)) if len(known) else np.nan

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from tcrctl.errors import NoEquilibriumError
 from tcrctl.picture.laid_over import LaidOver, laid_over
-from tcrctl.picture.limits import Shares, joint_shares, limits_before_arming, side_shares
+from tcrctl.picture.limits import limits_before_arming
 from tcrctl.picture.settings import PictureSettings
 from tcrctl.picture.shape import Anatomy, anatomy_of, shape_of
+from tcrctl.picture.shares import Shares, joint_shares, side_shares
 from tcrctl.picture.suspects import Verdict, wrong_markers, wrong_rings
 from tcrctl.robot.equilibrium import equilibrium
 from tcrctl.robot.module import RING, ring_rows

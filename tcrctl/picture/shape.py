@@ -17,6 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tcrctl.picture.kernel import measure
@@ -43,8 +44,15 @@ class Shape(NamedTuple):
 
     def since(self, start: Shape) -> Shape:
         """Return the change since another shape; twists by the shorter way."""
-        twist = np.mod(self.twist - start.twist + np.pi, 2.0 * np.pi) - np.pi
-        return Shape(self.side - start.side, self.offset - start.offset, twist, self.bend - start.bend)
+        change: Shape = change_since(start, self)
+        return change
+
+
+@njit(cache=True, error_model="numpy")
+def change_since(start: Shape, now: Shape) -> Shape:
+    """Return the change from one shape to another; twists by the shorter way."""
+    twist = np.mod(now.twist - start.twist + np.pi, 2.0 * np.pi) - np.pi
+    return Shape(now.side - start.side, now.offset - start.offset, twist, now.bend - start.bend)
 
 
 class Anatomy(NamedTuple):
@@ -76,7 +84,13 @@ def shape_of(anatomy: Anatomy, markers: Array, seen: NDArray[np.bool_]) -> Shape
         markers: All ring nodes (3 n, 3) [m].
         seen: Which of them count (3 n,).
     """
-    return Shape(*measure(anatomy.base, anatomy.apex, markers, seen))
+    writable = np.array(seen)  # those of some frames are not, which would be another kernel
+    return Shape(*measure(anatomy.base, anatomy.apex, markers, writable))
+
+
+def completed(known: Shape, shape: Shape) -> Shape:
+    """Return a shape with what it does not know taken from another one."""
+    return Shape(*(np.where(np.isnan(a), b, a) for a, b in zip(known, shape, strict=True)))
 
 
 def median_shape(shapes: list[Shape]) -> Shape:
@@ -86,7 +100,7 @@ def median_shape(shapes: list[Shape]) -> Shape:
     """
     first = shapes[0]
     for shape in shapes[1:]:
-        first = Shape(*(np.where(np.isnan(a), b, a) for a, b in zip(first, shape, strict=True)))
+        first = completed(first, shape)
     changes = [shape.since(first) for shape in shapes]
     return Shape(*(a + _median([c[i] for c in changes]) for i, a in enumerate(first)))
 

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.picture.limits import Shares
+from tcrctl.picture.shares import Shares
 from tcrctl.robot.module import RING
 from tcrctl.signals import Array
 
@@ -105,7 +105,8 @@ def _loose_marker(sides: Array) -> int | None:
 
 def judge_joints(verdict: Verdict, worst: Array) -> None:
     """Say how many joints are strange: if most are, what is left when rings are left out agrees by chance."""
-    verdict.strange = float(np.count_nonzero(worst > 1.0)) / max(1, np.count_nonzero(worst > 0.0))
+    seen = int(np.count_nonzero(worst > 0.0))
+    verdict.strange = float(np.count_nonzero(worst > 1.0)) / max(1, seen)
 
 
 def wrong_rings(verdict: Verdict, look: Callable[[NDArray[np.bool_]], Shares]) -> None:
