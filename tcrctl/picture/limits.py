@@ -19,7 +19,7 @@ from tcrctl.picture.settings import PictureSettings
 PULL: Final = -3.5e-3
 PER_BEND: Final = 0.03e-3 * 180.0 / np.pi
 #: Difference along the body as a share of what the joints beside it have moved.
-ALONG: Final = 0.5
+ALONG: Final = 0.55
 #: Largest change along the body that a joint can have [m].
 GIVE: Final = 0.01
 #: Noise of markers that the limits allow for [m].
