@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.errors import PictureError
-from tcrctl.picture.kernel import typical_change
+from tcrctl.picture.kernel import Shape, typical_change
 from tcrctl.picture.limits import limits_in_motion
 from tcrctl.picture.notes import PictureNotes
 from tcrctl.picture.settings import PictureSettings
-from tcrctl.picture.shape import Shape, anatomy_of, completed, median_shape, shape_of
+from tcrctl.picture.shape import anatomy_of, completed, median_shape, shape_of
 from tcrctl.picture.shares import Shares, is_strange, joint_shares, side_shares
 from tcrctl.picture.suspects import Verdict, judge_joints, wrong_markers, wrong_rings
 from tcrctl.robot.module import RING
@@ -81,6 +81,12 @@ class PictureJudge:
             self._listen(measured.t, shapes[-1].side)
         self._start, self._unknown = median_shape(shapes), True
         self._blend = -float(np.expm1(-period / FILTER))
+        self._warm_up(start[-1], shapes[-1])
+
+    def _warm_up(self, measured: Measurement, shape: Shape) -> None:
+        """Use every kernel once, so that none is compiled or loaded in motion."""
+        is_strange(self._start, shape, self._limits, self._noise)
+        self._searched(measured.nodes.astype(float), measured.valid, shape)
 
     def judged(self, measured: Measurement) -> Measurement:
         """Return the frame without what is not believed; the frame itself if all of it is."""
@@ -105,13 +111,17 @@ class PictureJudge:
 
     def _verdict(self, nodes: Array, measured: Measurement, shape: Shape) -> Verdict:
         """Return what is not believed; nearly always nothing, which one look tells."""
-        verdict, seen = Verdict(np.zeros_like(self._out)), measured.valid
         if self._unknown:
             self._start = completed(self._start, shape)
             self._unknown = any(np.isnan(part).any() for part in self._start)
         well = not self._frame_out and not self._out.any()
         if well and not is_strange(self._start, shape, self._limits, self._noise):
-            return verdict
+            return Verdict(np.zeros_like(self._out))
+        return self._searched(nodes, measured.valid, shape)
+
+    def _searched(self, nodes: Array, seen: NDArray[np.bool_], shape: Shape) -> Verdict:
+        """Return what is not believed, marker by marker and ring by ring."""
+        verdict = Verdict(np.zeros_like(self._out))
         rings_out = self._out.reshape(-1, RING).any(axis=1)
         again = np.where(rings_out, BACK, 1.0)
         change = shape.since(self._start)

@@ -17,42 +17,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from tcrctl.picture.kernel import measure
+from tcrctl.picture.kernel import Shape, measure
 from tcrctl.robot.module import apexes, rings
 from tcrctl.robot.ring_axes import ring_frames
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
-
-
-class Shape(NamedTuple):
-    """See the module's docstring; n free rings, the joint above each.
-
-    Attributes:
-        side: From every marker of a ring to the next one of it (n, 3) [m].
-        offset: (n, 3) [m].
-        twist: (n,) [rad].
-        bend: (n, 2), sines of angles.
-    """
-
-    side: Array
-    offset: Array
-    twist: Array
-    bend: Array
-
-    def since(self, start: Shape) -> Shape:
-        """Return the change since another shape; twists by the shorter way."""
-        change: Shape = change_since(start, self)
-        return change
-
-
-@njit(cache=True, error_model="numpy")
-def change_since(start: Shape, now: Shape) -> Shape:
-    """Return the change from one shape to another; twists by the shorter way."""
-    twist = np.mod(now.twist - start.twist + np.pi, 2.0 * np.pi) - np.pi
-    return Shape(now.side - start.side, now.offset - start.offset, twist, now.bend - start.bend)
 
 
 class Anatomy(NamedTuple):

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from tcrctl.picture.kernel import Shape, change_since
 from tcrctl.picture.limits import GIVE, IN_OFFSET, IN_SIDE, IN_TWIST, SIGMAS, USUAL, Limits
-from tcrctl.picture.shape import Shape, change_since
 from tcrctl.signals import Array
 
 
