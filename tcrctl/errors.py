@@ -167,6 +167,15 @@ class SafetyLimitError(StoppedError):
         self.unit = unit
 
 
+class PictureError(StoppedError):
+    """Too little of what the cameras show can be believed; ``doubts`` says what is not, and why."""
+
+    def __init__(self, step: int, doubts: str) -> None:
+        text = f"safety stop at step {step}: the cameras' picture is not believed: {doubts}"
+        super().__init__(text, step, hint="tcrctl rig check; limits: safety.picture, docs/bench.md.")
+        self.doubts = doubts
+
+
 class PluginStoppedError(StoppedError):
     """Code from elsewhere failed while it ran, or returned what cannot be used.
 

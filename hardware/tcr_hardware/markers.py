@@ -17,6 +17,8 @@ from tcr_hardware.rigid_transform import IDENTITY, Array, RigidTransform
 
 #: No marker has it: numbers have 32 bits.
 UNKNOWN_ID = -(1 << 40)
+#: If more of the nodes than this share have jumped at once, those that lie where they were do so by chance.
+MOST = 0.5
 
 
 class MarkerMapError(HardwareError):
@@ -183,7 +185,7 @@ class MarkerMap:
             )
             reasons[self._unlabelled] = np.where(np.isnan(found[self._unlabelled, 0]), "missing", "")
         jumped = np.linalg.norm(found - reference, axis=1) > width  # False without a reference
-        reasons[(reasons == "") & jumped] = "jump"
+        reasons[_jumped(reasons == "", jumped)] = "jump"
         if frame.models is None:
             reasons[self._named] = "no names"
         if frame.doubt:
@@ -230,6 +232,13 @@ class MarkerMap:
         near = distance[nodes, picked] <= width[nodes]
         found[nodes[near]] = points[picked[near]]
         return found
+
+
+def _jumped(usable: NDArray[np.bool_], jumped: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which nodes have jumped: all of them if most have, for then it is the picture that has."""
+    jumped = jumped & usable
+    most = np.count_nonzero(jumped) > MOST * np.count_nonzero(usable)
+    return usable if most else jumped
 
 
 def _check_shared(nodes: Sequence[NodeMarker]) -> None:

@@ -18,7 +18,7 @@ from typing import Final
 PACKAGE: Final = Path(__file__).parents[1]
 #: Parts of the program in which kernels may stand; a test holds that they stand nowhere else.
 FOLDERS: Final = (
-    "controller", "elements", "estimator", "numerics", "plant", "robot", "task", "trajectory",
+    "controller", "elements", "estimator", "numerics", "picture", "plant", "robot", "task", "trajectory",
 )  # fmt: skip
 _KERNEL: Final = b"njit"
 _SETTINGS: Final = (b"tcrctl.config", b"pydantic")

@@ -6,6 +6,13 @@ faults:
   - {at_s: 12, plc: exception, with: {code: 4}, robot: tcr700}
   - {at_s: 15, cameras: {version: '3.1'}}
 
+The picture can be wrong while every frame is right: a frame ``turned_deg``, ``turning_deg_s`` or ``mirrored``
+about a ``pivot``, labels that have moved on within a body (``moved_labels``) or are ``exchanged`` between two, and
+markers or bodies that are ``drifting``:
+
+  - {at_s: 0, cameras: {turned_deg: [0, 20, 0], pivot: tcr600_base}}
+  - {at_s: 5, after: moving, cameras: {drifting: [tcr600_m11], drift_mm_s: [0.5, 0, 0]}}
+
 Cameras can also ``restart`` (once), stream another ``version``, and be ``renamed``: all markers get names that
 nobody knows.
 """
@@ -13,7 +20,6 @@ nobody knows.
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -21,21 +27,22 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from tcr_hardware.emulators.motive import MotiveEmulator
-from tcr_hardware.emulators.motive_faults import MotiveFaults
 from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.emulators.plc_faults import FAULTS
 from tcr_hardware.modbus.registers import Status
 from tcrctl.config import strict_yaml
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.settings import Settings, quantity, refuse
+from tcrctl.emulate.camera_faults import (
+    CAMERA_FAULTS,
+    CHANGES,
+    DEFAULTS,
+    camera_value,
+    known_names,
+    names_in,
+    wrong_value,
+)
 
-_DEFAULTS = MotiveFaults()
-_CHANGES = {"version": "", "renamed": False}
-CAMERA_FAULTS = (*(field.name for field in dataclasses.fields(MotiveFaults)), *_CHANGES)
-#: Camera faults that are shares of all frames.
-SHARES = ("loss", "duplicate", "corrupt", "truncate", "wrong_size", "second_source")
-#: Camera faults that name markers.
-MARKERS = ("occluded", "missing", "nan", "swap")
 #: A drive that moves faster than this between two looks is moving [um].
 MOVING_UM = 30.0
 
@@ -71,7 +78,7 @@ def _unknown(fault: Fault) -> Iterator[Finding]:
     for name, value in fault.cameras.items() if isinstance(fault.cameras, dict) else ():
         if name not in CAMERA_FAULTS:
             yield ("cameras", name), f"there is no such fault; known: {', '.join(CAMERA_FAULTS)}"
-        elif wrong := _wrong_value(name, value):
+        elif wrong := wrong_value(name, value):
             yield ("cameras", name), wrong
     if fault.plc is not None and fault.plc not in FAULTS:
         yield ("plc",), f"there is no fault {fault.plc}; known: {', '.join(FAULTS)}"
@@ -80,55 +87,6 @@ def _unknown(fault: Fault) -> Iterator[Finding]:
             if name not in FAULTS[fault.plc].arguments:
                 known = ", ".join(FAULTS[fault.plc].arguments) or "none"
                 yield ("with", name), f"{fault.plc} has no such argument; known: {known}"
-
-
-def _wrong_value(name: str, value: Any) -> str:
-    """Say what is wrong with the value of a camera fault; empty if nothing is."""
-    try:
-        taken = camera_value(name, value)
-    except (TypeError, ValueError) as error:
-        return str(error)
-    if name in SHARES and not 0 <= taken <= 1:
-        return f"must be a share of the frames, 0 to 1, not {value!r}"
-    if name in ("delay_s", "reorder") and not 0 <= taken < float("inf"):
-        return f"must be >= 0, not {value!r}"
-    return ""
-
-
-def camera_value(name: str, value: Any) -> Any:
-    """Return a value from a file as the attribute of ``MotiveFaults`` wants it.
-
-    Raises:
-        ValueError: If it is not of that kind.
-    """
-    if name == "version" and isinstance(value, str) and re.fullmatch(r"[0-9]+\.[0-9]+", value):
-        return value
-    kind = type(_CHANGES[name] if name in _CHANGES else getattr(_DEFAULTS, name))
-    if kind is frozenset and isinstance(value, list) and all(isinstance(item, str) for item in value):
-        return frozenset(value)
-    if name == "swap" and isinstance(value, list) and all(isinstance(v, list) and len(v) == 2 for v in value):
-        return tuple((str(a), str(b)) for a, b in value)
-    if name == "offset_m" and isinstance(value, list) and len(value) == 3:
-        return tuple(float(item) for item in value)
-    if (
-        kind in (bool, int, float)
-        and type(value) in (kind, int)
-        and not (kind is bool and type(value) is int)
-    ):
-        return kind(value)
-    names = {
-        str: "text",
-        frozenset: "a list of marker names",
-        bool: "true or false",
-        int: "a whole number",
-        float: "a number",
-    }
-    special = {
-        "version": "a version such as '3.1'",
-        "swap": "a list of pairs of marker names",
-        "offset_m": "three numbers",
-    }
-    raise ValueError(f"must be {special.get(name) or names[kind]}, not {value!r}")
 
 
 class FaultScript(Settings):
@@ -168,12 +126,13 @@ def _strangers(
     if robots is not None and fault.robot is not None and fault.robot not in robots:
         yield (*at, "robot"), f"there is no robot {fault.robot} on the rig; there are {', '.join(robots)}"
     for key, value in fault.cameras.items() if isinstance(fault.cameras, dict) else ():
-        if markers is None or key not in MARKERS:
+        known = known_names(key, markers or ())
+        if markers is None or not known:
             continue
-        given = [name for pair in value for name in pair] if key == "swap" else value
-        if unknown := [name for name in given if name not in markers]:
-            some = ", ".join(list(markers)[:4])
-            yield (*at, "cameras", key), f"there is no marker {', '.join(unknown)}; there are {some}, ..."
+        if unknown := [name for name in names_in(value) if name not in known]:
+            what = "marker" if known[0] in markers else "body"
+            some = ", ".join(known[:4])
+            yield (*at, "cameras", key), f"there is no {what} {', '.join(unknown)}; there are {some}, ..."
 
 
 class FaultPlayer:
@@ -224,8 +183,7 @@ class FaultPlayer:
         if fault.cameras == "restart":
             self._motive.restart()
         elif isinstance(fault.cameras, dict):
-            for name, value in fault.cameras.items():
-                self._change_cameras(name, camera_value(name, value))
+            self._change_cameras({name: camera_value(name, value) for name, value in fault.cameras.items()})
         else:
             for plc in self._chosen(fault):
                 plc.faults.set(str(fault.plc), **fault.with_)
@@ -235,20 +193,20 @@ class FaultPlayer:
     def _clear(self, fault: Fault) -> None:
         self._notify(f"over: {fault}")
         if isinstance(fault.cameras, dict):
-            for name in fault.cameras:
-                self._change_cameras(name, getattr(_DEFAULTS, name, None))
+            self._change_cameras({name: getattr(DEFAULTS, name, None) for name in fault.cameras})
         elif fault.plc is not None:
             for plc in self._chosen(fault):
                 plc.faults.clear(fault.plc)
 
-    def _change_cameras(self, name: str, value: Any) -> None:
-        """Set a fault of the cameras, or take it back with its default."""
-        if name == "version":
-            self._motive.change_version(value or self._motive.settings.version)
-        elif name == "renamed":
-            self._motive.change_models([f"{known}?" if value else known for known in self._names])
-        else:
-            setattr(self._motive.faults, name, value)
+    def _change_cameras(self, faults: Mapping[str, Any]) -> None:
+        """Set faults of the cameras, all in the same frame, or take them back with their defaults."""
+        motive = self._motive
+        if "version" in faults:
+            motive.change_version(faults["version"] or motive.settings.version)
+        if "renamed" in faults:
+            motive.change_models([f"{known}?" if faults["renamed"] else known for known in self._names])
+        others = {name: value for name, value in faults.items() if name not in CHANGES}
+        motive.faults = dataclasses.replace(motive.faults, **others)
 
     def _chosen(self, fault: Fault) -> list[PlcEmulator]:
         return [plc for name, plc in self._plcs.items() if fault.robot in (None, name)]

@@ -18,6 +18,7 @@ from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.exact import TrueState
 from tcrctl.experiment.compilation import announced_compilation
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
+from tcrctl.experiment.first_look import Report, build_picture, first_frames, measured_pose
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.plant_robot import description_of_plant
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, with_draws
@@ -27,20 +28,16 @@ from tcrctl.plant.own import OwnPlant
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.realistic import rehearsal_plant
 from tcrctl.plant.rig.assembly import build_rig
-from tcrctl.plant.rig.operation import Operation
+from tcrctl.plant.rig.operation import Operation, unheard
 from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.plugins.plugin import plugin_of
-from tcrctl.robot import pose
-from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot, build_robot
-from tcrctl.signals import Array, StepRecord
+from tcrctl.signals import StepRecord
 from tcrctl.task.task import Task, build_task, task_targets
 from tcrctl.trajectory.start_blend import StartBlend
 from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
 
-#: Measurements that are averaged to find where the robot is before it moves.
-START_READS: Final = 10
 #: Steps of the rehearsal that loads every kernel.
 WARM_UP_STEPS: Final = 3
 
@@ -205,13 +202,16 @@ def build_plant(
     return build(settings, experiment, operation or Operation())
 
 
-def build_parts(experiment: Experiment, plant: Plant, state: TrueState | None) -> tuple[Parts, float]:
+def build_parts(
+    experiment: Experiment, plant: Plant, state: TrueState | None, report: Report = unheard
+) -> tuple[Parts, float]:
     """Build estimator and controller for a plant at rest, and let the trajectory begin where the plant is.
 
     Args:
         experiment: The experiment.
         plant: Is measured, not driven.
         state: Its true positions and velocities if it knows them.
+        report: Takes what the loop has to say of the cameras' picture.
 
     Returns:
         The parts of a loop within the experiment's safety limits, for one run; and the distance of the measured
@@ -226,7 +226,8 @@ def build_parts(experiment: Experiment, plant: Plant, state: TrueState | None) -
     period = experiment.period
     trajectory, offset = experiment.trajectory, np.nan
     calibration = MarkerCalibration.of(spec.estimator.calibrated, robot.n_modules)
-    found = measured_pose(plant, robot, calibration)
+    frames = first_frames(plant)
+    found = measured_pose(frames, robot, calibration)
     if found is not None:
         offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))
         rest = spec.controller.settling
@@ -239,29 +240,9 @@ def build_parts(experiment: Experiment, plant: Plant, state: TrueState | None) -
         period=period,
         steps=step_count(trajectory.duration, period),
         guard=SafetyGuard(experiment.safety),
+        picture=build_picture(spec.safety.picture, robot, period, frames, report),
     )
     return parts, offset
-
-
-def measured_pose(
-    plant: Plant, robot: Robot, calibration: MarkerCalibration, reads: int = START_READS
-) -> tuple[Array, Array] | None:
-    """End position (3,) [m] and normal (3,) as the cameras see them, averaged; None if they do not see them.
-
-    Args:
-        plant: At rest.
-        robot: Says which nodes are the tip ring, and roughly how its rings lie.
-        calibration: What is known of cameras and markers.
-        reads: How many measurements are averaged.
-    """
-    rows = ring_rows(robot.n_modules)
-    tip, shape = rows.index(robot.tip), robot.rest.q.reshape(-1, 3)[rows]
-    seen = [calibration.corrected(plant.read(), shape) for _ in range(reads)]
-    rings = [m.nodes[tip : tip + 3].astype(float) for m in seen if m.valid[tip : tip + 3].all()]
-    if not rings:
-        return None
-    ring = np.mean(rings, axis=0).ravel()
-    return pose.position(ring, 0), pose.normal(ring, 0)
 
 
 def _rehearse(experiment: Experiment) -> None:

@@ -17,9 +17,17 @@ from typing import Final
 import numpy as np
 
 from tcrctl.errors import DeviceError, InputError, LogError, StoppedError, TcrctlError
+from tcrctl.experiment.first_look import check_picture
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.outcome import summary_of
-from tcrctl.experiment.prepare import Experiment, Notify, build_parts, build_plant, make_task, silent
+from tcrctl.experiment.prepare import (
+    Experiment,
+    Notify,
+    build_parts,
+    build_plant,
+    make_task,
+    silent,
+)
 from tcrctl.experiment.provenance import attachments, own_files, start_metadata, versions
 from tcrctl.experiment.run_folder import (
     LOG,
@@ -108,7 +116,7 @@ def run_experiment(
         journal = Journal(pace.moment, notify)
         plant, state = build_plant(experiment, Operation(pace.time, journal.report, confirmed))
         try:
-            parts, start_offset = build_parts(experiment, plant, state)
+            parts, start_offset = build_parts(experiment, plant, state, journal.report)
             folder = make_run_folder(out, experiment.spec.name)
             log = _open_log(experiment, folder, realtime=realtime, tap=tap)
             journal.attach(log.event)
@@ -220,6 +228,8 @@ def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogW
     started = False
     try:
         with _pace_kept(experiment, parts.pace, log):
+            if experiment.paced:
+                check_picture(experiment.spec.safety.picture, experiment.robot, plant)
             plant.start()
             started = True
             run_loop(parts)

@@ -26,6 +26,7 @@ from tcrctl.experiment.plant_robot import plant_robot
 from tcrctl.experiment.plugged import trust_of, validated, with_plugins
 from tcrctl.experiment.summary import TASK, UNITS
 from tcrctl.experiment.table_file import with_samples
+from tcrctl.picture.settings import PictureSettings
 from tcrctl.plant.realistic import as_drawn
 from tcrctl.plant.rig.file import LoadedRig, load_rig
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
@@ -63,6 +64,7 @@ class SafetySettings(Settings):
     """When a run is stopped, beside the robot's tension limit and two unsolved steps in a row."""
 
     position_error_mm: float = quantity("mm", "largest distance between estimated and wanted end", 60.0, gt=0)
+    picture: PictureSettings = PictureSettings()
 
 
 class StartSettings(Settings):

@@ -31,6 +31,8 @@ def in_todays_form(settings: Any) -> Any:
         found["controller"] = _without_news(_nested(found["controller"]))
     if _is_kind(found.get("estimator"), "passive_observer"):
         found["estimator"] = {"fit_start": False, "hold_blank": False, **found["estimator"]}
+    if isinstance(found.get("safety"), dict):
+        found["safety"] = {"picture": {"judged": False}, **found["safety"]}
     return found
 
 

@@ -2,12 +2,12 @@
 
 One control step:
 
-    reference ------------------------+
-                                      v
-    plant.read -> estimator -> controller -> guard -> plant.write -> record
-        ^             ^                                    |
-        |             +------------- applied --------------+
-        +------------------------- robot <-----------------+
+    reference ----------------------------------+
+                                                v
+    plant.read -> picture -> estimator -> controller -> guard -> plant.write -> record
+        ^                        ^                                    |
+        |                        +------------- applied --------------+
+        +------------------------------- robot <----------------------+
 
 The robot is that of the plant: equations, a bench, or a record.
 """
@@ -16,19 +16,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from tcrctl.controller.controller import Controller
-from tcrctl.errors import SafetyLimitError
+from tcrctl.errors import StoppedError
 from tcrctl.estimator.estimator import Estimator
 from tcrctl.loop.pacing import Pace, Unpaced
 from tcrctl.loop.safety import SafetyGuard
+from tcrctl.picture.picture import Picture, Unjudged
 from tcrctl.plant.plant import Plant
 from tcrctl.signals import Array, Command, Measurement, StepRecord, Timing
 from tcrctl.trajectory.trajectory import Trajectory, sample_reference
+
+#: How the reason of a step begins whose drives were held because the picture was in doubt.
+HELD: Final = "held: "
 
 
 def step_count(duration: float, period: float) -> int:
@@ -68,6 +72,7 @@ class Parts:
         pace: Lets every step begin when it is due.
         guard: Says when the run must stop; watches one run.
         record: Takes every step.
+        picture: Judges what the cameras show; watches one run.
     """
 
     trajectory: Trajectory
@@ -79,17 +84,18 @@ class Parts:
     pace: Pace = field(default_factory=Unpaced)
     guard: SafetyGuard = field(default_factory=SafetyGuard)
     record: Callable[[StepRecord], None] = _discard
+    picture: Picture = field(default_factory=Unjudged)
 
 
 class Ticked(NamedTuple):
     """One step, and why it must be the last one; None if it need not."""
 
     step: StepRecord
-    broken: SafetyLimitError | None
+    broken: StoppedError | None
 
 
 def tick(parts: Parts, k: int, applied: Command | None) -> Ticked:
-    """Do one control step. One that breaks a safety limit holds the drives.
+    """Do one control step. One that breaks a safety limit holds the drives, and so does a picture in doubt.
 
     Args:
         parts: The loop.
@@ -105,16 +111,18 @@ def tick(parts: Parts, k: int, applied: Command | None) -> Ticked:
     t = k * parts.period
     now = parts.pace.now
     late, t0 = parts.pace.wait(t), now()
-    measured, truth = plant.read(), plant.truth()
+    seen, truth = plant.read(), plant.truth()
     t1 = now()
+    measured, doubt = parts.picture.judged(seen), parts.picture.doubt
     estimate = parts.estimator.update(measured, still(measured) if applied is None else applied)
     t2 = now()
     ahead = (k + in_periods(parts.controller.ahead, parts.period)) * parts.period
     reference = sample_reference(parts.trajectory, t, ahead)
     wanted, info = parts.controller.control(estimate, reference)
     t3 = now()
-    broken = parts.guard.check(k, reference, estimate, wanted, info)
-    sent = plant.write(still(measured) if broken else wanted)
+    broken = parts.picture.broken(k) or parts.guard.check(k, reference, estimate, wanted, info)
+    sent = plant.write(still(measured) if broken or doubt else wanted)
+    info = replace(info, reason=HELD + doubt) if doubt else info
     timing = Timing(t1 - t0, t2 - t1, t3 - t2, now() - t3, late)
     step = StepRecord(k, t, parts.period, reference, measured, estimate, wanted, sent, info, truth, timing)
     return Ticked(step, broken)

@@ -29,6 +29,7 @@ from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.plant.stroke import within_stroke
 from tcrctl.replay.environment import Change, changes, plugin_changes
 from tcrctl.replay.rebuild import Origin, rebuild
+from tcrctl.replay.recorded_picture import RecordedPicture
 from tcrctl.replay.replayed_log import open_replayed
 from tcrctl.replay.result import ALL_STEPS, EXACT, Replay, Tolerance, Window, what_if
 from tcrctl.robot.robot import Robot, build_robot
@@ -174,6 +175,7 @@ class _Replay:
             period=self._period,
             steps=0,  # as many as are recorded
             guard=SafetyGuard(limits),
+            picture=RecordedPicture(self._plant),
         )
 
     def _take(self, step: StepRecord, record: Record | None) -> None:

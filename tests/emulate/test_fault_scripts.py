@@ -28,6 +28,9 @@ WRONG = {
     "not a switch": ("{at_s: 1, cameras: {freeze: 1}}", "must be true or false"),
     "not names": ("{at_s: 1, cameras: {nan: 3}}", "must be a list of marker names"),
     "not pairs": ("{at_s: 1, cameras: {swap: [a, b]}}", "must be a list of pairs"),
+    "not a vector": ("{at_s: 1, cameras: {turned_deg: [0, 20]}}", "must be three numbers, not [0, 20]"),
+    "not finite": ("{at_s: 1, cameras: {drift_mm_s: [0, .inf, 0]}}", "must be three numbers"),
+    "not a body": ("{at_s: 1, cameras: {pivot: 3}}", "must be the name of a body, not 3"),
     "not a version": ("{at_s: 1, cameras: {version: 4.1}}", "must be a version such as '3.1'"),
     "before the start": ("{at_s: -1, plc: estop}", "must be >= 0"),
     "more than all frames": ("{at_s: 1, cameras: {loss: 3}}", "must be a share of the frames, 0 to 1, not 3"),
@@ -51,7 +54,17 @@ STRANGERS = {
         "{at_s: 1, cameras: {nan: [a.1, b.7]}}",
         ":2:25: faults.0.cameras.nan: there is no marker b.7",
     ),
+    "body": ("{at_s: 1, cameras: {moved_labels: [b]}}", "there is no body b; there are a, ..."),
+    "pivot": ("{at_s: 1, cameras: {pivot: a.1}}", "there is no body a.1; there are a, ..."),
+    "pair of bodies": ("{at_s: 1, cameras: {exchanged: [[a, a.2]]}}", "there is no body a.2"),
+    "marker or body": ("{at_s: 1, cameras: {drifting: [a, a.1, q]}}", "there is no marker q; there are a.1"),
     "pair": ("{at_s: 1, cameras: {swap: [[a.1, c.3]]}}", "there is no marker c.3"),
+}
+
+
+RIGHT = {
+    **{"tcr999": "tcr600", "b.7": "a.2", "c.3": "a.2", "[b]": "[a]", "pivot: a.1": "pivot: a"},
+    **{"[a, a.2]": "[a, a]", ", q]": "]"},
 }
 
 
@@ -62,7 +75,9 @@ def test_a_robot_or_marker_that_is_not_on_the_rig_is_found_before_anything_start
     with pytest.raises(SpecError) as caught:
         script(tmp_path, line, **known)
     assert message in str(caught.value)
-    script(tmp_path, line.replace("tcr999", "tcr600").replace("b.7", "a.2").replace("c.3", "a.2"), **known)
+    for strange, right in RIGHT.items():
+        line = line.replace(strange, right)
+    script(tmp_path, line, **known)
 
 
 @pytest.fixture
@@ -117,6 +132,8 @@ def test_every_fault_of_the_emulators_can_be_asked_for(tmp_path):
     values = {
         **{"occluded": names, "missing": names, "nan": names, "swap": "[[a.1, a.2]]"},
         **{"offset_m": "[0, 0, 1]", "reorder": "2", "version": "'3.1'", "renamed": "true"},
+        **dict.fromkeys(("turned_deg", "turning_deg_s", "mirrored", "drift_mm_s"), "[0, 0, 1]"),
+        **{"pivot": "a", "moved_labels": "[a]", "exchanged": "[[a, b]]", "drifting": "[a, b.1]"},
     }
     switches = ("freeze", "silent", "mute", "untracked", "unlabelled")
     given = {name: values.get(name, "true" if name in switches else "0.5") for name in CAMERA_FAULTS}
@@ -133,3 +150,25 @@ def test_cameras_change_names_and_version_and_change_them_back(tmp_path, bench):
     assert (motive.tracked.names, motive.version) == (("a.1?", "a.2?"), (3, 1))
     player.play(2.0)
     assert (motive.tracked.names, motive.version) == (("a.1", "a.2"), (4, 1))
+
+
+def test_what_belongs_together_is_wrong_in_the_same_frame(tmp_path, bench):
+    motive, plc = bench
+    made = script(tmp_path, "{at_s: 1, cameras: {turned_deg: [0, 0, 90], pivot: a}, for_s: 1}")
+    seen = []
+
+    class Watched:
+        """Takes note of every change of the faults."""
+
+        tracked, settings = motive.tracked, motive.settings
+
+        def __setattr__(self, name, value):
+            seen.append((value.turned_deg, value.pivot))
+            object.__setattr__(self, name, value)
+
+    watched = Watched()
+    object.__setattr__(watched, "faults", motive.faults)
+    player = FaultPlayer(made, watched, {"tcr600": plc}, lambda text: None)
+    player.play(1.0)
+    player.play(2.0)
+    assert seen == [((0.0, 0.0, 90.0), "a"), ((0.0, 0.0, 0.0), "")]

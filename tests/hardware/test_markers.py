@@ -152,6 +152,26 @@ def test_a_jump_of_the_whole_scene_is_refused_as_a_jump_of_every_node():
     assert not jumped.valid.any()
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_what_lies_where_it_was_in_a_picture_that_has_jumped_does_so_by_chance(axis):
+    """A mirrored picture: markers on the mirror stand still."""
+    mirrored = REST * np.where(np.arange(3) == axis, -1.0, 1.0)
+    assert (np.linalg.norm(mirrored - REST, axis=1) < 0.001).any() or axis == 0
+    markers = MarkerMap(LABELLED, REST)
+    markers.locate(frame(REST, 0.0))
+    for k in range(1, 50):
+        assert set(markers.locate(frame(mirrored, 0.01 * k)).reasons) == {"jump"}
+    assert markers.locate(frame(REST, 1.0)).valid.all()
+
+
+def test_of_a_picture_of_which_half_has_jumped_the_other_half_is_used():
+    markers = MarkerMap(LABELLED, REST)
+    markers.locate(frame(REST, 0.0))
+    rows = np.arange(len(REST)) < len(REST) // 2
+    half = np.where(rows[:, None], shifted(0.1, 0.0, 0.0), REST)
+    assert markers.locate(frame(half, 0.01)).valid.tolist() == (~rows).tolist()
+
+
 def test_without_names_labelled_nodes_are_invalid():
     markers = MarkerMap([*LABELLED[:2], NodeMarker("m0.n3", asset=1, member=3)], REST[:3])
     assert markers.locate(frame(REST, models=None)).reasons == ("no names", "no names", "")

@@ -42,6 +42,8 @@ VARIANTS = {
     "two_rings": ("plant.measured_rings=[4, 8, 11]",),
     "saturated": ("controller.speed_limit_mm_s=4",),
     "stopped": ("safety.position_error_mm=0.2",),
+    "markers left out": ("plant.cameras.outliers={share: 0.05, size_mm: 30}",),
+    "held": ("plant.cameras.outliers={share: 0.15, size_mm: 60}", "safety.picture.least_share=0.7"),
 }
 BEFORE = (
     "controller.dither=off",
@@ -120,6 +122,16 @@ def test_every_kind_of_run_replays_bit_for_bit(logs, name):
     assert (found.status, found.reason) == ("identical", "")
     assert (found.steps, found.compared, found.different, found.exit_code) == (steps, steps, 0, 0)
     assert (found.environment, found.not_compared) == ((), ())
+
+
+def test_steps_in_which_the_picture_was_in_doubt_are_recorded_as_such(logs):
+    whole, left, held = ([*read_log(logs(name)).steps()] for name in ("full", "markers left out", "held"))
+    assert all(step.measurement.valid.all() for step in whole)
+    assert not all(step.measurement.valid.all() for step in left)
+    reasons = [step.info.reason for step in held]
+    assert any(reason.startswith("held: ring ") for reason in reasons)
+    for step, reason in zip(held, reasons, strict=True):
+        assert not reason.startswith("held: ") or not step.applied.speed.any()
 
 
 #: Keys of a prediction that did not exist.

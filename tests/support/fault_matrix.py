@@ -19,7 +19,10 @@ from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_limits import PlcLimitSettings
 from tcr_hardware.modbus.registers import Control
 from tcrctl.errors import TcrctlError
+from tcrctl.experiment.first_look import build_picture, check_picture, first_frames
 from tcrctl.loop.pacing import RealTime
+from tcrctl.picture.picture import Unjudged
+from tcrctl.picture.settings import PictureSettings
 from tcrctl.plant.rig.assembly import build_rig
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.operation import Operation
@@ -35,6 +38,9 @@ BEFORE = 0.15
 WATCHED = 0.4
 """Time that a fault which shall do no harm is watched [s]."""
 AFTER_END = 5.0
+
+#: ``stop_s`` of the judged picture [s].
+PICTURE_STOP = PictureSettings().stop_s
 
 #: What real benches get; a busy test computer is given more time.
 STRICT = {"stale_after_ms": 50, "stale_stop_ms": 200, "silence_stop_ms": 100}
@@ -52,7 +58,7 @@ class Case:
         connect, armed, moving, stopping: State in which the supervisor ends, by the phase in which the fault
             begins; empty where the phase is not tried.
         says: Part of the reason; empty if there is none.
-        rule: What bounds the time to the end: ``stale``, ``silence`` or ``now``; empty if nothing ends.
+        rule: What bounds the time to the end, see :func:`bound`; empty if nothing ends.
         exit_code: That of the error.
     """
 
@@ -88,6 +94,16 @@ def blinding(name, **faults):
     )
 
 
+def wrong_picture(name, **faults):
+    """A picture that is wrong all at once; what of it jumps far is no measurement at all."""
+    return Case(name, faults, connect="disarmed", armed="disarmed", moving="disarmed", rule="picture")
+
+
+def drifting(name, what):
+    """Something that comes loose is left out."""
+    return harmless(name, cameras={"drifting": frozenset((what,)), "drift_mm_s": (20.0, 0.0, 0.0)})
+
+
 def plc_lost(name, fault, says, **arguments):
     return Case(
         name,
@@ -104,6 +120,7 @@ def plc_lost(name, fault, says, **arguments):
 
 NAMES = [f"m{ring}.n{node}" for ring in range(1, 6) for node in (1, 2, 3)]
 MARKERS = frozenset(NAMES)
+RINGS = frozenset(f"m{ring}" for ring in range(1, 6))
 FEW = frozenset(("m1.n1", "m3.n2", "m5.n3"))
 
 CASES = [
@@ -133,6 +150,16 @@ CASES = [
     Case("Motive restarts", ("restart",), moving="disarmed", says="usable measurement", rule="stale"),
     Case("origin jumps by 100 mm", {"offset_m": (0.1, 0.0, 0.0)}, moving="disarmed",
          says="usable measurement", rule="stale"),
+    wrong_picture("frame turned by 20 deg", turned_deg=(0.0, 0.0, 20.0)),
+    wrong_picture("frame tilted by 10 deg", turned_deg=(10.0, 0.0, 0.0)),
+    wrong_picture("frame mirrored", mirrored=(1, 0, 0)),
+    wrong_picture("all labels of all rings turned", moved_labels=RINGS),
+    Case("frame turns by 30 deg/s", {"turning_deg_s": (0.0, 0.0, 30.0)}, moving="disarmed", says="picture",
+         rule="turning"),
+    Case("rings 2 and 5 swapped", {"exchanged": (("m2", "m5"),)}, connect="disarmed", moving="running"),
+    Case("labels of ring 3 turned", {"moved_labels": frozenset(("m3",))}, connect="disarmed", moving="running"),
+    drifting("end ring drifts by 20 mm/s", "m5"),
+    drifting("a marker drifts by 20 mm/s", "m3.n2"),
     Case("frames 0.5 s late", {"delay_s": 0.5}, moving="disarmed", says="usable measurement", rule="stale"),
     harmless("one exception answer", plc=("exception", {"code": 6, "count": 1})),
     harmless("one lost answer", plc=("silence", {"count": 1})),
@@ -270,6 +297,13 @@ class WatchedEmulators:
         operation = Operation(time.monotonic, lambda *event: self.events.append(event), confirmed=True)
         return build_rig(self.loaded(), self.robot, PERIOD, operation)
 
+    def picture(self, plant: RigPlant):
+        """Judge the picture as a run does before the drives are armed; returns who judges it in motion."""
+        settings = PictureSettings()
+        check_picture(settings, self.robot, plant)
+        report = lambda *event: self.events.append(event)  # noqa: E731
+        return build_picture(settings, self.robot, PERIOD, first_frames(plant), report)
+
     def fail(self, case: Case):
         if isinstance(case.cameras, tuple):
             method, *given = case.cameras
@@ -289,15 +323,19 @@ class WatchedEmulators:
 class Loop:
     """Drives at a constant speed in real time, until an error or the time is up."""
 
-    def __init__(self, plant):
-        self.plant, self.pace, self.k = plant, RealTime(PERIOD), 0
+    def __init__(self, plant, picture=None):
+        self.plant, self.picture = plant, picture or Unjudged()
+        self.pace, self.k = RealTime(PERIOD), 0
 
     def run(self, seconds):
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             self.pace.wait(self.k * PERIOD)
-            self.plant.read()
-            self.plant.write(Command(np.full(4, SPEED * (1 if self.k % 100 < 50 else -1)), np.zeros(4)))
+            self.picture.judged(self.plant.read())
+            if broken := self.picture.broken(self.k):
+                raise broken
+            speed = 0.0 if self.picture.doubt else SPEED * (1 if self.k % 100 < 50 else -1)
+            self.plant.write(Command(np.full(4, speed), np.zeros(4)))
             self.k += 1
 
 
@@ -310,8 +348,9 @@ def play(case: Case, phase: str, robot: Any, rules: dict[str, Any], watchdog_ms:
         decided = begun
         try:
             plant = emulators.plant()
+            picture = emulators.picture(plant)
             plant.start()
-            loop = Loop(plant)
+            loop = Loop(plant, picture)
             if phase in ("moving", "stopping"):
                 loop.run(BEFORE)
             begun = decided = time.monotonic()
@@ -397,6 +436,8 @@ def bound(case: Case, phase: str, rules: dict[str, Any], timeout_ms: float = 60.
         "stale": rules["stale_stop_ms"] / 1e3 + cycle,
         "silence": max(rules["silence_stop_ms"], 2 * timeout_ms) / 1e3 + cycle,
         "frozen": 0.2 + cycle,
+        "picture": max(rules["stale_stop_ms"] / 1e3, PICTURE_STOP) + 2 * cycle,
+        "turning": 15.0 / 30.0 + PICTURE_STOP + 2 * cycle,
         "following": 2e-3 / SPEED + 0.1 + cycle,
     }[case.rule]
 

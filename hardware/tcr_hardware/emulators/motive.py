@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcr_hardware.emulators import motive_encoder as encoder
+from tcr_hardware.emulators.motive_distortion import Distortion
 from tcr_hardware.emulators.motive_encoder import Stamp, Version
 from tcr_hardware.emulators.motive_faults import MotiveFaults
 from tcr_hardware.emulators.motive_link import Client, MotiveLink
@@ -55,6 +56,7 @@ class MotiveEmulator:
         self._positions = positions
         self.tracked = TrackedMarkers(names, positions())
         self.link = MotiveLink(self.settings)
+        self._distortion = Distortion()
         self._outbox = Outbox(self.settings.seed)
         self.frames_sent = 0
         self._lock = threading.Lock()
@@ -173,7 +175,8 @@ class MotiveEmulator:
             self.ticks(sent),
             flags,
         )
-        return stamp, self.tracked.view(self._positions(), self.faults)
+        seen = self._distortion.seen(self.tracked, self._positions(), self.faults, now)
+        return stamp, self.tracked.view(seen, self.faults)
 
     def _expose(self, now: float) -> None:
         """Take one frame and put it into the outbox, for every listener in its version."""

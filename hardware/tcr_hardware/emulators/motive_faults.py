@@ -28,6 +28,14 @@ class MotiveFaults:
         swap: Pairs of markers whose labels are exchanged.
         second_source: Share of frames that come from another port of the same computer too.
         offset_m: All markers jump by this [m].
+        turned_deg: The frame is turned by this rotation vector, in the axes of the cameras [deg].
+        turning_deg_s: The frame turns at this rate from now on [deg/s].
+        mirrored: The frame is mirrored across the plane with this normal; zeros for not at all.
+        pivot: Body about whose centre the frame is turned and mirrored; empty for the origin.
+        moved_labels: Bodies whose labels have moved on by one marker.
+        exchanged: Pairs of bodies, of as many markers each, whose labels are exchanged.
+        drifting: Markers and bodies that drift from now on.
+        drift_mm_s: Their velocity, in the axes of the cameras [mm/s].
     """
 
     loss: float = 0.0
@@ -48,3 +56,11 @@ class MotiveFaults:
     swap: tuple[tuple[str, str], ...] = ()
     second_source: float = 0.0
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turning_deg_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mirrored: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    pivot: str = ""
+    moved_labels: frozenset[str] = frozenset()
+    exchanged: tuple[tuple[str, str], ...] = ()
+    drifting: frozenset[str] = frozenset()
+    drift_mm_s: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -109,6 +109,12 @@ class TrackedMarkers:
             np.where(occluded[rows], OCCLUDED, SEEN),
         )
 
+    def rows_of(self, name: str) -> NDArray[np.intp]:
+        """Return the row of a marker, or those of a body; none if there is neither."""
+        if name in self._row:
+            return np.array([self._row[name]])
+        return next((body.rows for body in self.bodies if body.name == name), np.zeros(0, np.intp))
+
     def _mask(self, names: frozenset[str]) -> NDArray[np.bool_]:
         mask = np.zeros(len(self.names), bool)
         mask[[self._row[name] for name in names if name in self._row]] = True

@@ -61,8 +61,9 @@ def test_faults_that_do_no_harm_do_not_stop_the_run(tcr5x4):
     assert len(harmless) > 10
     with WatchedEmulators(tcr5x4, PATIENT, WATCHDOG_MS) as emulators:
         plant = emulators.plant()
+        picture = emulators.picture(plant)
         plant.start()
-        loop = Loop(plant)
+        loop = Loop(plant, picture)
         loop.run(BEFORE)
         for case in harmless:
             emulators.fail(case)

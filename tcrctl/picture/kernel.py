@@ -1,0 +1,101 @@
+"""The shape that markers show, ring by ring; see :mod:`tcrctl.picture.shape`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tcrctl.numerics.rotation import cross, norm
+from tcrctl.signals import Array
+
+#: Markers of one ring.
+RING = 3
+
+
+class Shape(NamedTuple):
+    """See :mod:`tcrctl.picture.shape`; n free rings, the joint above each.
+
+    Attributes:
+        side: From every marker of a ring to the next one of it (n, 3) [m].
+        offset: (n, 3) [m].
+        twist: (n,) [rad].
+        bend: (n, 2), sines of angles.
+    """
+
+    side: Array
+    offset: Array
+    twist: Array
+    bend: Array
+
+    def since(self, start: Shape) -> Shape:
+        """Return the change since another shape; twists by the shorter way."""
+        change: Shape = change_since(start, self)
+        return change
+
+
+@njit(cache=True, error_model="numpy")
+def change_since(start: Shape, now: Shape) -> Shape:
+    """Return the change from one shape to another; twists by the shorter way."""
+    twist = np.mod(now.twist - start.twist + np.pi, 2.0 * np.pi) - np.pi
+    return Shape(now.side - start.side, now.offset - start.offset, twist, now.bend - start.bend)
+
+
+@njit(cache=True, error_model="numpy")
+def measure(
+    base: Array, apex: Array, markers: Array, seen: NDArray[np.bool_]
+) -> tuple[Array, Array, Array, Array]:
+    """Return sides (n, 3), offsets (n, 3) [m], twists (n,) [rad] and bends (n, 2); NaN for what is not seen.
+
+    Args:
+        base: Ring nodes of the base (3, 3) [m].
+        apex: Apex of every module but the last in the axes of its ring, base first (n, 3) [m].
+        markers: Ring nodes (3 n, 3) [m].
+        seen: Which of them count (3 n,).
+    """
+    n = apex.shape[0]
+    side, offset = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    twist, bend = np.full(n, np.nan), np.full((n, 2), np.nan)
+    above, above_at = _axes(base), _centre(base)
+    above_seen = True
+    for i in range(n):
+        ring, there = markers[RING * i : RING * i + RING], seen[RING * i : RING * i + RING]
+        for k in range(RING):
+            if there[k] and there[(k + 1) % RING]:
+                side[i, k] = norm(ring[k] - ring[(k + 1) % RING])
+        whole = there[0] and there[1] and there[2]
+        own, at = (_axes(ring), _centre(ring)) if whole else (above, above_at)
+        if whole and above_seen:
+            arm = above_at + np.dot(above.T, apex[i]) - at
+            offset[i] = np.dot(own, arm)
+            x, z = np.dot(own, above[0]), np.dot(own, above[2])
+            twist[i], bend[i] = np.arctan2(x[1], x[0]), z[:2]
+        above, above_at, above_seen = own, at, whole
+    return side, offset, twist, bend
+
+
+@njit(cache=True, error_model="numpy")
+def _centre(ring: Array) -> Array:
+    centre: Array = (ring[0] + ring[1] + ring[2]) / RING
+    return centre
+
+
+@njit(cache=True, error_model="numpy")
+def _axes(ring: Array) -> Array:
+    """Return the axes of a ring, one per row: x along its first side, z its normal; NaN if it has none."""
+    x = ring[1] - ring[0]
+    z = cross(x, ring[2] - ring[0])
+    axes = np.empty((3, 3))
+    axes[0], axes[2] = x / norm(x), z / norm(z)
+    axes[1] = cross(axes[2], axes[0])
+    return axes
+
+
+@njit(cache=True, error_model="numpy")
+def typical_change(now: Array, before: Array) -> float:
+    """Return the median of how much values (n, 3) have changed, of those that are known; NaN if none is."""
+    change = np.abs(now - before).ravel()
+    known = change[change == change]
+    return float(np.median(known)) if len(known) else np.nan
