@@ -9,7 +9,7 @@ import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Any
 
 from pydantic import Field, model_validator
 
@@ -22,6 +22,7 @@ from tcrctl.errors import InputError, Problem, SpecError
 from tcrctl.estimator.settings import EstimatorSettings, PassiveObserverSettings
 from tcrctl.experiment.calibration_file import with_calibration
 from tcrctl.experiment.criterion import CriterionText
+from tcrctl.experiment.log_settings import LogSettings
 from tcrctl.experiment.plant_robot import plant_robot
 from tcrctl.experiment.plugged import trust_of, validated, with_plugins
 from tcrctl.experiment.summary import TASK, UNITS
@@ -35,29 +36,6 @@ from tcrctl.robot.doubts import doubts
 from tcrctl.robot.sections import Name
 from tcrctl.task.settings import TaskSettings
 from tcrctl.trajectory.settings import TrajectorySettings
-
-#: Control rate up to which ``full_state_s: auto`` means every step [Hz].
-_RICH_RATE_HZ: Final = 20.0
-
-
-class LogSettings(Settings):
-    """How much of the steps is logged, and how often it reaches the disk: at the earlier of the two intervals."""
-
-    flush_s: float = quantity("s", "longest time between two flushes", 0.5, gt=0)
-    flush_steps: int = Field(default=500, ge=1, description="most control steps between two flushes")
-    fsync: bool = Field(default=False, description="wait until the disk has the data, against power failure")
-    full_state_s: Literal["auto"] | Annotated[float, Field(ge=0)] = quantity(
-        "s",
-        "time between two steps with all node positions, velocities and forces (0: every step), which replay "
-        "computes again; auto: every step at up to 20 Hz, else 1 s",
-        "auto",
-    )
-
-    def full_state(self, period: float) -> float:
-        """Return the time between two steps that are logged in full at a control period [s]; 0: every step."""
-        if self.full_state_s != "auto":
-            return self.full_state_s
-        return 0.0 if period * _RICH_RATE_HZ > 1.0 - 1e-9 else 1.0
 
 
 class SafetySettings(Settings):

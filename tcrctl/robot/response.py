@@ -11,9 +11,8 @@ axial forces of any other configuration, divided by the robot's length, would ou
 
 The motion is projected on a small M-orthonormal basis V: the lowest modes, followed from step to step by one
 orthogonal iteration V <- A^-1 M V [GVL13, Sec. 8.2.4], and the static answers A^-1 G'C to the drives, which make
-the final value of every ramp exact. Time integration is the two-stage, L-stable, second-order SDIRK rule with
-γ = 1 - 1/√2 [A77]. Cables count as two-sided, so that a slack cable still has authority over its (negative)
-predicted tension.
+the final value of every ramp exact (time steps: robot.reduced_motion). Cables count as two-sided, so that a slack
+cable still has authority over its (negative) predicted tension.
 """
 
 from __future__ import annotations
@@ -30,31 +29,13 @@ from tcrctl.robot.equations import Workspace
 from tcrctl.robot.hole_drag import HoleDrag, project_drag
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
+from tcrctl.robot.reduced_motion import GAMMA, Pull, step
 from tcrctl.signals import Array
 
-GAMMA = 1.0 - np.sqrt(0.5)
 #: Rows of the end pose in a response: position, normal, twist.
 POSE_ROWS = 7
 #: A column that keeps less than this part of its length beside the others adds nothing but rounding.
 DEPENDENT = 1e-6
-
-
-class Pull(NamedTuple):
-    """What acts on the reduced positions, for a unit ramp of every drive and none.
-
-    Attributes:
-        growing: P, force per time (r, m + 1).
-        steady: F, force while the drive moves (r, m + 1).
-        drag: D, force per speed (r, r).
-        turned: Part of the drag that follows the slip within a stage, γ h / (τ + γ h); it is in D and F already.
-        held: Drag at the start of a stage (r, m + 1), changed from stage to stage.
-    """
-
-    growing: Array
-    steady: Array
-    drag: Array
-    turned: float
-    held: Array
 
 
 class Release(NamedTuple):
@@ -173,54 +154,6 @@ def _project(ws: Workspace, V: Array, GV: Array) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def _stage(U: Array, a: float, b: float, t: float, pull: Pull, x: Array, v: Array, X: Array) -> None:
-    """Set X = (a I + b D + V'AV)^-1 (a x + b v + b D x + F + f + t P): positions of a stage, from its start x, v.
-
-    D and F are the parts that follow within the stage, f what is left of the drag of its start.
-    """
-    left = 1.0 - pull.turned
-    for i in range(X.shape[0]):
-        for c in range(X.shape[1]):
-            X[i, c] = a * x[i, c] + b * v[i, c] + pull.steady[i, c] + t * pull.growing[i, c]
-            X[i, c] += left * pull.held[i, c]
-            for j in range(X.shape[0]):
-                X[i, c] += b * pull.drag[i, j] * x[j, c]
-    block_banded.solve_transposed(U, X)
-    block_banded.solve_upper(U, X)
-
-
-@njit(cache=True, error_model="numpy")
-def _turn(pull: Pull, speed: Array, part: float) -> None:
-    """Let the drag go a part of its way in a stage, whose speeds are (r, m + 1)."""
-    for i in range(speed.shape[0]):
-        for c in range(speed.shape[1]):
-            goal = pull.steady[i, c]
-            for j in range(speed.shape[0]):
-                goal -= pull.drag[i, j] * speed[j, c]
-            pull.held[i, c] += part * (goal - pull.turned * pull.held[i, c])
-
-
-@njit(cache=True, error_model="numpy")
-def _step(U: Array, damping: float, t: float, h: float, pull: Pull, x: Array, vx: Array) -> None:
-    """Move reduced positions and velocities (r, m + 1) on by one step h of the rule."""
-    b = 1.0 / (GAMMA * h)
-    a, stage, speed = b * b + damping * b, np.empty(x.shape), np.empty(x.shape)
-    _stage(U, a, b, t + GAMMA * h, pull, x, vx, stage)
-    for i in range(x.shape[0]):
-        for c in range(x.shape[1]):
-            speed[i, c] = b * (stage[i, c] - x[i, c])
-            x[i, c] += (1.0 - GAMMA) * h * speed[i, c]
-            vx[i, c] += (1.0 - GAMMA) * h * b * (speed[i, c] - vx[i, c])
-    _turn(pull, speed, (1.0 - GAMMA) / GAMMA)
-    _stage(U, a, b, t + h, pull, x, vx, stage)
-    for i in range(x.shape[0]):
-        for c in range(x.shape[1]):
-            vx[i, c] = b * (stage[i, c] - x[i, c])
-            x[i, c] = stage[i, c]
-    _turn(pull, vx, 1.0)
-
-
-@njit(cache=True, error_model="numpy")
 def _pull(model: Model, ws: Workspace, V: Array, GV: Array, drag: Drag, h: float) -> Pull:
     """Return what acts in steps of h on the basis V, GV = G V (m, r)."""
     m, r = GV.shape
@@ -307,7 +240,7 @@ def respond(
     _project_state(model.mass, V, release.offset, release.v, x, vx)
     _observe(CV, GV, ws.axial, 0.0, x, start)
     for n in range(steps):
-        _step(reduced, model.damping, n * h, h, pull, x, vx)
+        step(reduced, model.damping, n * h, h, pull, x, vx)
         _observe(CV, GV, ws.axial, (n + 1) * h, x, change[n])
         change[n] -= start
     return change, True
