@@ -36,7 +36,7 @@ class HoleDragSettings(Settings):
     """Cables that a dither keeps sliding feel a drag; friction as in the robot file, else as usual."""
 
     turn_s: float = quantity("s", "time that the friction needs for a turn of the dither", 0.1, gt=0)
-    follow_s: float = quantity("s", "time constant with which the drag follows the motion", 0.1, ge=0)
+    follow_s: float = quantity("s", "time constant with which the drag follows the motion", 0.03, ge=0)
 
 
 class MultiStepSettings(Settings):

@@ -1,12 +1,12 @@
 """How fast cables slip through the holes, as the drag of a dithered robot follows it.
 
 The mean friction of a cable that is moved to and fro answers a change of the mean slip only within the next half
-wave. So the drag f of robot.hole_drag follows with a time constant τ, about half a wave,
+wave. So the drag f of robot.hole_drag follows with a time constant τ, a part of a wave,
 
     τ f' = c p ((1 - ξ) ũ + p' v) - f,        ũ' = (u - ũ) / lag
 
-with ũ the speed of a cable behind its drive. At 1.6 Hz that is an angle of 45 degrees: a loop that does not count
-it feeds the slow modes of the robot where it means to damp them.
+with ũ the speed of a cable behind its drive. A loop that does not count it feeds the slow modes of the robot where
+it means to damp them.
 """
 
 from __future__ import annotations
