@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tcrctl.numerics.rotation import matrix_from_quaternion, norm, rotation_between
 from tcrctl.robot.module import RING
-from tcrctl.robot.ring_axes import axes_of
+from tcrctl.robot.ring_axes import axes_of, centre_of
 from tcrctl.signals import Array
 
 
@@ -40,7 +40,7 @@ def carry(before: Array, now: Array, seen: NDArray[np.bool_], known: NDArray[np.
         for i in range(RING):
             if not there[i]:
                 found[i] = carried[i]
-        turn, old, new = _turn(axes_of(ring), axes_of(found)), _centre(ring), _centre(found)
+        turn, old, new = _turn(axes_of(ring), axes_of(found)), centre_of(ring), centre_of(found)
 
 
 @njit(cache=True)
@@ -69,12 +69,6 @@ def _moved(turn: Array, old: Array, new: Array, point: Array) -> Array:
         for j in range(3):
             moved[i] += turn[i, j] * (point[j] - old[j])
     return moved
-
-
-@njit(cache=True)
-def _centre(ring: Array) -> Array:
-    centre: Array = (ring[0] + ring[1] + ring[2]) / RING
-    return centre
 
 
 @njit(cache=True)

@@ -20,14 +20,7 @@ from tcrctl.errors import DeviceError, InputError, LogError, StoppedError, Tcrct
 from tcrctl.experiment.first_look import check_picture
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.outcome import summary_of
-from tcrctl.experiment.prepare import (
-    Experiment,
-    Notify,
-    build_parts,
-    build_plant,
-    make_task,
-    silent,
-)
+from tcrctl.experiment.prepare import Experiment, Notify, build_parts, build_plant, make_task, silent
 from tcrctl.experiment.provenance import attachments, own_files, start_metadata, versions
 from tcrctl.experiment.run_folder import (
     LOG,

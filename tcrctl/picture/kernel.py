@@ -8,11 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tcrctl.numerics.rotation import cross, norm
+from tcrctl.numerics.rotation import norm
+from tcrctl.robot.module import RING
+from tcrctl.robot.ring_axes import axes_of, centre_of
 from tcrctl.signals import Array
-
-#: Markers of one ring.
-RING = 3
 
 
 class Shape(NamedTuple):
@@ -58,7 +57,7 @@ def measure(
     n = apex.shape[0]
     side, offset = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
     twist, bend = np.full(n, np.nan), np.full((n, 2), np.nan)
-    above, above_at = _axes(base), _centre(base)
+    above, above_at = axes_of(base), centre_of(base)
     above_seen = True
     for i in range(n):
         ring, there = markers[RING * i : RING * i + RING], seen[RING * i : RING * i + RING]
@@ -66,7 +65,7 @@ def measure(
             if there[k] and there[(k + 1) % RING]:
                 side[i, k] = norm(ring[k] - ring[(k + 1) % RING])
         whole = there[0] and there[1] and there[2]
-        own, at = (_axes(ring), _centre(ring)) if whole else (above, above_at)
+        own, at = (axes_of(ring), centre_of(ring)) if whole else (above, above_at)
         if whole and above_seen:
             arm = above_at + np.dot(above.T, apex[i]) - at
             offset[i] = np.dot(own, arm)
@@ -74,23 +73,6 @@ def measure(
             twist[i], bend[i] = np.arctan2(x[1], x[0]), z[:2]
         above, above_at, above_seen = own, at, whole
     return side, offset, twist, bend
-
-
-@njit(cache=True, error_model="numpy")
-def _centre(ring: Array) -> Array:
-    centre: Array = (ring[0] + ring[1] + ring[2]) / RING
-    return centre
-
-
-@njit(cache=True, error_model="numpy")
-def _axes(ring: Array) -> Array:
-    """Return the axes of a ring, one per row: x along its first side, z its normal; NaN if it has none."""
-    x = ring[1] - ring[0]
-    z = cross(x, ring[2] - ring[0])
-    axes = np.empty((3, 3))
-    axes[0], axes[2] = x / norm(x), z / norm(z)
-    axes[1] = cross(axes[2], axes[0])
-    return axes
 
 
 @njit(cache=True, error_model="numpy")

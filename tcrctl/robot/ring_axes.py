@@ -22,7 +22,7 @@ def ring_frames(nodes: Array) -> Array:
 
 @njit(cache=True)
 def axes_of(ring: Array) -> Array:
-    """Return those of one ring (3, 3), one per row, from its nodes (3, 3): the same as a kernel."""
+    """Return those of one ring (3, 3), one per row, from its nodes (3, 3), in a kernel; NaN if it has none."""
     side = ring[1] - ring[0]
     normal = cross(side, ring[2] - ring[0])
     axes = np.empty((3, 3))
@@ -30,3 +30,10 @@ def axes_of(ring: Array) -> Array:
     axes[2] = normal / norm(normal)
     axes[1] = cross(axes[2], axes[0])
     return axes
+
+
+@njit(cache=True)
+def centre_of(ring: Array) -> Array:
+    """Return the centre of one ring (3,) [m] from its nodes (3, 3)."""
+    centre: Array = (ring[0] + ring[1] + ring[2]) / RING
+    return centre
