@@ -241,7 +241,7 @@ def respond(
     _observe(CV, GV, ws.axial, 0.0, x, start)
     for n in range(steps):
         step(reduced, model.damping, n * h, h, pull, x, vx)
-        _observe(CV, GV, ws.axial, (n + 1) * h, x, change[n])
+        _observe(CV, GV, ws.axial, n * h + h, x, change[n])
         change[n] -= start
     return change, True
 
