@@ -59,6 +59,7 @@ def test_settings_are_compared_one_by_one(a, tmp_path):
     assert (found.first, found.same) == (None, False)
 
 
+@pytest.mark.slow
 def test_one_ulp_in_one_column_is_found_with_its_step_and_size(a, tmp_path, capsys):
     def nudge(step):
         if step.k in (12, 20):

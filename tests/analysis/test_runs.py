@@ -16,6 +16,7 @@ from tcrctl.errors import InputError
 NUMBERS = st.floats(-1e6, 1e6)
 
 
+@pytest.mark.slow
 @given(NUMBERS, NUMBERS)
 def test_a_comparison_is_that_of_the_numbers(a, b):
     expected = {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b, "=": a == b, "==": a == b, "!=": a != b}

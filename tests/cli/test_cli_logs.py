@@ -338,6 +338,7 @@ def test_export_wants_one_format(log):
     assert tcrctl("export", log, "--csv", "--npz")[0] == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["--csv", "--npz", "--parquet", "--mat"])
 def test_a_log_without_steps_is_an_empty_table(form, log, tmp_path):
     data = log.read_bytes()

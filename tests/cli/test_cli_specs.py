@@ -169,6 +169,7 @@ def test_every_verb_explains_itself_with_an_example(verb: str, capsys: Output) -
     assert f"tcrctl {verb}" in capsys.readouterr().out.split("Example", 1)[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments", [[], ["nonsense"], ["show"], ["list", "--nonsense"], ["show", "letter_q"]]
 )

@@ -82,6 +82,7 @@ def said(capsys, call):
     return capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("terminal", [{}, {"NO_COLOR": "1"}, {"TERM": "dumb"}], ids=str)
 @pytest.mark.parametrize("columns", [60, 80, 120])
 def test_verbs_keep_to_the_width_of_the_terminal(columns, terminal, log, capsys, monkeypatch):

@@ -58,6 +58,7 @@ def test_a_file_that_is_too_large_is_not_read_whole(tmp_path):
         strict_yaml.load(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", ["x", ".nan", "[1]"])
 def test_the_first_problems_of_thousands_are_listed(values):
     document = strict_yaml.loads(f"values: [{f'{values}, ' * 4000}1]")

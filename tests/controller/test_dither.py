@@ -114,6 +114,7 @@ def test_an_end_that_is_not_thrown_is_left_in_peace(tcr700):
     assert not np.any(places(dither, WAVE))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("away", "wakes"), [(0.7e-3, False), (4e-3, True)])
 def test_a_robot_that_slides_is_dithered_only_by_convincing_evidence(tcr700, away, wakes):
     slides, never_tried = running(tcr700), running(tcr700)
@@ -221,6 +222,7 @@ def test_its_memory_is_all_that_the_next_steps_depend_on(tcr700):
     np.testing.assert_array_equal(places(one, WAVE), places(other, WAVE))
 
 
+@pytest.mark.slow
 def test_commands_stay_within_speed_limit_and_stroke(tcr700):
     settings = ioc(speed_limit_mm_s=20.0, dither=DitherSettings(least_mm=5.0, most_mm=5.0))
     controller = build_controller(settings, tcr700)

@@ -23,6 +23,7 @@ def kinematic(**changes):
     return KinematicSettings(kind="kinematic", **changes)
 
 
+@pytest.mark.slow
 @given(arrays(float, (3, 6), elements=ENTRY), arrays(float, 3, elements=ENTRY), st.floats(0.01, 1.0))
 def test_damped_rates_are_the_regularised_least_squares_solution(J, rate, damping):
     J = J + np.eye(3, 6)  # so that no direction counts as free

@@ -77,6 +77,7 @@ def test_a_plant_whose_cables_are_tighter_than_the_model_knows_is_not_wound_in(t
     assert believed[-1] > 0.1
 
 
+@pytest.mark.slow
 def test_nor_are_slacker_ones_paid_out(tcr700):
     errors, speeds, _ = closed_loop(
         tcr700, ioc(dither="off"), (0.0, 0.0, 0.0), 4.0, cables={"initial_tension": 0.85}

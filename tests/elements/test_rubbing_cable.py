@@ -72,6 +72,7 @@ def test_a_chain_is_solved_as_by_an_independent_solver(seed):
     assert cost(T, wanted, stiffness) <= cost(other, wanted, stiffness) * (1.0 + 1e-9) + 1e-15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mu", [0.05, 0.3])
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_a_cable_that_slides_everywhere_obeys_the_capstan_law(mu, direction):

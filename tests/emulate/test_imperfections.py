@@ -59,6 +59,7 @@ def test_markers_sit_beside_their_nodes_those_of_the_base_do_not(tcr5x4):
     np.testing.assert_allclose(np.linalg.norm(back[3:] - rings[3:], axis=1), 1e-3, rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["off", "moderate"])
 def test_the_robot_moves_as_that_of_a_simulated_plant_with_ideal_drives(tcr5x4, level):
     real = Imperfections("tcr5x4", tcr5x4, MISMATCH, level, 1)

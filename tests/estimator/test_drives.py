@@ -63,6 +63,7 @@ def test_encoders_are_believed():
     assert np.array_equal(found, places)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag", [0.0, 0.02, 0.03, 0.1, 0.25])
 def test_the_lag_of_drives_with_encoders_is_found(lag):
     set_points, places = driven(lag)

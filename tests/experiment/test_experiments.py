@@ -32,6 +32,7 @@ def test_a_shipped_experiment_is_feasible_with_room_to_correct(name):
     assert experiment.spec.criteria
 
 
+@pytest.mark.slow
 def test_a_dry_run_writes_nothing_and_says_what_a_run_would_do(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "letter_t", "--dry-run", "--json"]) == 0

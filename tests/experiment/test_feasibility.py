@@ -76,6 +76,7 @@ def test_the_drives_found_hold_the_end_where_it_is_wanted(robot, radius, rise):
     assert (path.time[0], path.time[-1]) == (0.0, trajectory.duration)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [0.0, 20.0, 35.0])
 def test_a_pose_is_held_and_no_cable_is_slack(long_robot, tilt):
     trajectory = Circle(long_robot, 0.03, 0.01, tilt)

@@ -32,6 +32,7 @@ def run(name, overrides, tmp_path, capsys, *options):
     return code, json.loads(printed.out), printed.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "overrides", "reason"),
     [

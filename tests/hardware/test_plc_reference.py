@@ -300,6 +300,7 @@ def test_strict_compilers_find_nothing_to_say_about_the_program():
     assert TypeProblems(BLOCK.tree).found == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("written", "instead", "problem"),
     [
@@ -356,6 +357,7 @@ def restart(both):
     both.emulated.power_up()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "control", [FOLLOW, ON, Control(0x1F), FOLLOW | Control.RESET, Control.RUN | Control.ZERO, Control(0xFF)]
 )
@@ -381,6 +383,7 @@ def test_a_program_that_starts_with_old_registers_enables_moves_and_zeroes_nothi
     assert armed.emulated.enabled
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("measured", [0.0, -1.0, math.nan, -math.inf, math.inf, 1e300, 5e-324])
 @pytest.mark.parametrize("then", [FOLLOW, Control.ENABLE, Control(0)])
 def test_no_measured_time_makes_a_set_point_that_is_no_number(armed, measured, then):

@@ -42,6 +42,7 @@ def noticed_mm(found, begin=BEGIN):
     return np.inf if found.first is None else SPEED * PERIOD * (found.first + STILL - begin)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "made"),
     [
@@ -96,6 +97,7 @@ def test_a_frame_that_is_wrong_all_at_once_holds_the_drives_at_once_and_then_sto
     assert sum(text.startswith("the drives are held") for text in told) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("rate", [(0, 0, 2), (1, 0, 0), (0, -1, 0)])
 def test_a_frame_that_turns_slowly_is_not_believed_before_the_end_is_far_off(rate, seed):
@@ -108,6 +110,7 @@ def test_a_frame_that_turns_slowly_is_not_believed_before_the_end_is_far_off(rat
     assert found.names[0] == "the frame of the cameras"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "second"), [(4, 7), (1, 2), (10, 11), (1, 11), (5, 6)])
 def test_swapped_rings_are_left_out(first, second):
     found = judged(wrong_from(lambda m: exchanged(m, first, second)))
@@ -117,6 +120,7 @@ def test_swapped_rings_are_left_out(first, second):
     assert not any(out.any() for out in found.out[: BEGIN - STILL])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ring", "by"), [(5, 1), (2, 2), (RINGS, 1), (RINGS, 2)])
 def test_a_ring_whose_labels_have_moved_on_is_left_out_alone(ring, by):
     found = judged(wrong_from(lambda m: labels_moved(m, ring, by)))
@@ -129,6 +133,7 @@ def test_a_ring_whose_labels_have_moved_on_is_left_out_alone(ring, by):
 WAYS = [(1, 0, 0), (0, 1, 0), (0, -1, 0), (-1, 1, 0), (0, 0, 1), (0, 0, -1), (1, 1, 1)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ring", [RINGS, 6, 3])
 @pytest.mark.parametrize("way", WAYS)
 def test_a_ring_that_drifts_is_left_out_before_it_is_far_off(ring, way):
@@ -140,6 +145,7 @@ def test_a_ring_that_drifts_is_left_out_before_it_is_far_off(ring, way):
     assert found.stopped is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [0, 16, 31, 32])
 @pytest.mark.parametrize("way", [(1, 0, 0), (0, 1, 0), (-1, 1, 0)])
 def test_a_marker_that_drifts_is_left_out_before_it_is_far_off(row, way):
@@ -150,6 +156,7 @@ def test_a_marker_that_drifts_is_left_out_before_it_is_far_off(row, way):
     assert found.stopped is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [4, 16, 25])
 def test_a_marker_that_drifts_out_of_the_plane_of_its_ring_tilts_it_and_is_left_out_too(row):
     found = judged(drifting([row], (0, 0, 1)))
@@ -167,6 +174,7 @@ def test_what_nobody_can_tell_is_not_pretended_to_be_told():
     assert noticed_mm(judged(rising)) > 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [4.0, 10.0, 40.0])
 def test_an_outlier_is_left_out_in_its_frame_only(size):
     made = frames(1)

@@ -20,6 +20,7 @@ def against(distort=lambda m: m, seed=1, at=0, **made):
     return objections(PictureSettings(), pictures.robot(), [distort(m) for m in shown])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [0, 200, 350, 470])
 @pytest.mark.parametrize(
     ("seed", "made"),
@@ -29,6 +30,7 @@ def test_a_healthy_robot_is_accepted_wherever_it_stands(seed, made, at):
     assert against(seed=seed, at=at, **made) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [(1.0, 0.0), (-0.6, 0.8)])
 def test_a_robot_that_hangs_far_beside_its_model_is_accepted(way):
     """Real robots hang up to 61 mm aside."""
@@ -66,6 +68,7 @@ FRAMES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [0, 350])
 @pytest.mark.parametrize("name", FRAMES)
 def test_a_wrong_frame_is_named(name, at):
@@ -74,6 +77,7 @@ def test_a_wrong_frame_is_named(name, at):
     assert any(says in text for text in told), told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "second"), [(4, 7), (1, 2), (10, 11), (1, 11), (6, 7)])
 def test_swapped_rings_are_named(first, second):
     told = against(lambda m: exchanged(m, first, second))

@@ -133,6 +133,7 @@ def test_jitter_makes_frames_older_and_the_time_says_so():
         np.testing.assert_allclose(frame.nodes, rings(shift=VELOCITY * frame.t), rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [13.0, 60.0])
 def test_cameras_with_a_rate_of_their_own_deliver_their_newest_frame(rate):
     frames = moving(build(latency=0.012, rate_hz=rate), 100)
@@ -144,6 +145,7 @@ def test_cameras_with_a_rate_of_their_own_deliver_their_newest_frame(rate):
         np.testing.assert_allclose(frame.nodes, rings(shift=VELOCITY * frame.t), rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_frames_and_another_one_does_not():
     settings = {"marker_bias_mm": 1.0, "lost_markers": 0.1, "lost_frames": 0.1, "age_jitter_ms": 2.0}
 

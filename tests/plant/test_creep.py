@@ -49,6 +49,7 @@ def moved(plant, seconds, speed=0.0):
         plant.write(Command(np.full(plant.robot.n_cables, speed), np.zeros(plant.robot.n_cables)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [None, {"coefficient": 0.05}])
 def test_a_robot_relaxes_after_a_drive_step_by_what_the_cables_creep(tcr5x4, friction):
     """All cables taken in alike: each creeps r T / k, as if its drive had paid that out."""

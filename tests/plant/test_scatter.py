@@ -72,6 +72,7 @@ def test_masses_geometry_and_holes_have_the_wanted_deviation():
     assert off.std() == pytest.approx(1.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_base_is_tilted_by_that_angle_in_any_direction():
     tilts = many(lambda d: d.base.tilt_deg, tilt_deg=0.5)
     np.testing.assert_allclose(np.hypot(*tilts.T), 0.5)

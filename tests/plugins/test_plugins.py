@@ -259,6 +259,7 @@ def test_the_name_of_a_built_in_kind_stays_its_own(own, package, capsys):
     assert load_spec(own(experiment=EXPERIMENT.replace("./own.py:OWN", "ioc"))).spec.controller.plugin is None
 
 
+@pytest.mark.slow
 def test_an_experiment_with_kinds_of_a_file_is_itself_in_another_process_whatever_becomes_of_the_file(
     own, tmp_path
 ):

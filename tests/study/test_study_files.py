@@ -133,6 +133,7 @@ def test_a_study_is_no_experiment_and_says_how_it_is_started(capsys):
     assert "tcrctl sweep realistic" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped.studies())
 def test_every_shipped_study_is_valid_and_shown_whole(name, capsys):
     study = load_study(name)

@@ -126,6 +126,7 @@ def test_the_time_bar_pauses_seeks_and_sets_the_speed(log):
         )
 
 
+@pytest.mark.slow
 def test_a_late_viewer_gets_what_is_written_once(log):
     with Playing(log, paused=True) as playing, ViewerClient(playing.url) as first:
         first.subscribe("/log")
@@ -278,6 +279,7 @@ def test_a_view_that_fails_does_not_end_the_run(short, tmp_path, monkeypatch):
     assert str(live.failure) == "gone"
 
 
+@pytest.mark.slow
 def test_a_viewer_that_stops_reading_holds_nothing_up():
     """More than server and network can hold: the oldest are dropped, and sending stays quick."""
     with (

@@ -41,6 +41,7 @@ def connect(link, wire, exchange="auto"):
     return PlcBus(BusSettings(link, timeout_s=TIMEOUT_S, retries=0, exchange=exchange), dial=lambda: wire)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("link", [TcpLink("plc"), RtuLink("plc")], ids=["tcp", "rtu"])
 @pytest.mark.parametrize("exchange", ["fc23", "fc16_fc3"])
 def test_no_answer_of_a_plc_raises_anything_but_our_errors(link, exchange):

@@ -135,6 +135,7 @@ def test_every_exchange_moves_seq_and_heartbeat_by_one_also_over_the_wrap(bus, p
     assert eventually(lambda: plc.snapshot()["seq_ack"] == 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("low_first", [False, True])
 def test_a_plc_with_either_word_order_is_understood_when_the_order_may_be_any(low_first):
     with PlcEmulator(replace(CALM, low_word_first=low_first)) as plc:
@@ -146,6 +147,7 @@ def test_a_plc_with_either_word_order_is_understood_when_the_order_may_be_any(lo
             assert status.positions_um == pytest.approx((1500, -1, 2, 3, 4, 5), abs=20)
 
 
+@pytest.mark.slow
 def test_a_site_may_have_its_own_addresses_and_formats(wire):
     changes = {
         "SP": {"address": 40, "kind": "float32", "scale": 1000.0},
@@ -341,6 +343,7 @@ def _answers(bus):
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "register"),
     [("freeze_ack", "SEQ_ACK"), ("freeze_heartbeat", "HB_ECHO"), ("freeze_program", "PLC_CYCLE")],
@@ -366,6 +369,7 @@ def test_a_frozen_acknowledge_is_found_out_also_by_a_host_that_reads_in_between(
         watch()
 
 
+@pytest.mark.slow
 def test_refused_sets_are_reported_and_do_not_count_as_frozen(bus):
     settle(bus, STILL, ON, exchanges=3)
     for _ in range(40):
@@ -375,6 +379,7 @@ def test_refused_sets_are_reported_and_do_not_count_as_frozen(bus):
     assert bus.statistics.rejects >= 30
 
 
+@pytest.mark.slow
 def test_a_word_order_that_changes_under_way_is_noticed_on_both_ends(bus, plc):
     settle(bus, STILL, ON, exchanges=3)
     settle(bus, (1000,) * 6, FOLLOW, exchanges=40)
@@ -385,6 +390,7 @@ def test_a_word_order_that_changes_under_way_is_noticed_on_both_ends(bus, plc):
     assert plc.positions_um() == pytest.approx((1000,) * 6, abs=20)
 
 
+@pytest.mark.slow
 def test_a_host_that_dies_leaves_a_robot_that_holds_within_the_watchdog_time(watched_plc):
     with PlcBus(settings_for(watched_plc)) as bus:
         settle(bus, STILL, ON, exchanges=3)
@@ -408,6 +414,7 @@ def test_reading_does_not_feed_the_watchdog(watched_plc):
         assert eventually(lambda: Status.WATCHDOG in bus.read_status().status)
 
 
+@pytest.mark.slow
 def test_the_estop_is_seen_and_latched(bus, plc):
     settle(bus, STILL, ON, exchanges=3)
     plc.press_estop()

@@ -94,6 +94,7 @@ WAYS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("version", ["2.9", "3.0", "4.1"])
 def test_frames_arrive_every_way_and_mean_what_was_shown(way, version):
@@ -153,6 +154,7 @@ def test_requests_are_answered_or_refused():
             client.request("MakeCoffee")
 
 
+@pytest.mark.slow
 def test_a_mute_server_is_an_error_that_names_it():
     with serve() as motive:
         motive.faults.mute = True
@@ -162,6 +164,7 @@ def test_a_mute_server_is_an_error_that_names_it():
         assert caught.value.hint
 
 
+@pytest.mark.slow
 def test_nobody_there_is_told_apart_from_silence():
     client = NatNetClient(NatNetSettings(command_port=free_port(), multicast=False, data_port=free_port()))
     with pytest.raises(ServerSilentError) as caught:
@@ -223,6 +226,7 @@ def test_two_clients_are_served_in_their_own_versions():
             assert client.statistics().malformed == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", [0.01, 0.1, 0.5])
 def test_lost_frames_are_counted_and_the_others_used(loss):
     with linked(rate_hz=400.0) as (motive, client):
@@ -311,6 +315,7 @@ def test_names_can_be_waited_for():
             client.wait_models(timeout_s=0.1)
 
 
+@pytest.mark.slow
 def test_a_changed_version_is_followed():
     for options in ({}, {"multicast": True}) if multicast_works() else ({},):
         with linked(version="4.1", **options) as (motive, client):

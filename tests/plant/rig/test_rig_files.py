@@ -154,6 +154,7 @@ def test_list_names_the_rigs_and_a_resolved_rig_experiment_loads_again(tmp_path,
     assert strict_yaml.validate(strict_yaml.load(shipped.rigs()["loopback"]), RigFile).name == "loopback"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", RIG_VERBS)
 def test_every_rig_verb_explains_itself_with_an_example(verb, capsys):
     assert main(["rig", verb, "--help"]) == 0
