@@ -29,6 +29,7 @@ from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.plan import Situation
 from tcrctl.controller.prediction_settings import MultiStepSettings
 from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning, present
+from tcrctl.controller.rest_gain import RestGain, carry, gain_learning, no_gain, rest, tell
 from tcrctl.controller.slip import Slip, follow_slip, no_slip
 from tcrctl.controller.tension_gap import TensionGap
 from tcrctl.memory import POSITION, SPEED, Kept
@@ -58,6 +59,7 @@ class MultiStepMemory(NamedTuple):
         friction: Their friction (n_holes, 3), columns as in ``elements.rubbing_cable``.
         share: How much of the drag that it gives there is.
         slip: What that drag follows.
+        learnt: How the offset goes with the drives.
     """
 
     at: StaticMap
@@ -68,6 +70,7 @@ class MultiStepMemory(NamedTuple):
     friction: Array
     share: DragShare
     slip: Slip
+    learnt: RestGain
 
 
 @njit(cache=True, error_model="numpy")
@@ -111,16 +114,24 @@ def _update_offset(
             j = SIZE * (i + 1) + b
             force[k] += model.mass[i, row, b] * ((v[j] - memory.v[j]) / period + model.damping * v[j])
     linear.solve(ws, force, lag)
+    learns = tuning.gain.doubt > 0.0 and not tuning.rests
+    if learns:
+        carry(memory.learnt, tuning.gain, now.drive + now.behind, memory.offset, tip)
     dragged = _dragged(model, ws, memory, tuning.turn)
     if tuning.turn > 0.0:
         told = _told(model, ws, memory)
-        learn(memory.share, tuning.learning, _end(deviation, lag, tip), _end(np.zeros(v.shape[0]), told, tip))
+        end = _end(deviation, lag, tip) - memory.learnt.moved
+        learn(memory.share, tuning.learning, end, _end(np.zeros(v.shape[0]), told, tip))
     else:
         forget(memory.share, tuning.learning)
-    share = memory.share.share[0]
     for k in range(force.shape[0]):
-        j = 3 * FIXED + k
-        memory.offset[j] += tuning.blend * (deviation[j] + lag[k] - share * dragged[k] - memory.offset[j])
+        lag[k] = deviation[3 * FIXED + k] + lag[k] - memory.share.share[0] * dragged[k]
+    if learns:
+        tell(memory.learnt, tuning.gain, lag, memory.offset, tip)
+    else:
+        rest(memory.learnt, tuning.gain, now.drive + now.behind, tuning.blend)
+        for k in range(force.shape[0]):
+            memory.offset[3 * FIXED + k] += tuning.blend * (lag[k] - memory.offset[3 * FIXED + k])
 
 
 @njit(cache=True, error_model="numpy")
@@ -179,7 +190,10 @@ def forecast(
         away[k] = deviation[k] - memory.offset[k]
     held = np.zeros(ws.r.shape[0])
     drag_force(model, memory.drag, memory.slip.v, memory.slip.speed, held)
-    release, drag = response.Release(away, v), response.Drag(memory.drag, held, tuning.follow)
+    release, drag = (
+        response.Release(away, v, memory.learnt.gain),
+        response.Drag(memory.drag, held, tuning.follow),
+    )
     change, stable = response.respond(model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis, drag)
     with_lag(change, grid.ahead[0], tuning.drives, now.behind, now.queue)
     free, gain = superpose(change, now.outputs, grid.edges)
@@ -195,6 +209,9 @@ class MultiStep:
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
         self._tuning = make_tuning(period, settings.filter_s)._replace(
             learning=learning(period), follow=settings.follow_s
+        )
+        self._tuning = self._tuning._replace(
+            gain=gain_learning(settings.rest_gain, self._tuning.blend, period)
         )
         self._turn = settings.turn_s
         self._dead_time = dead_time
@@ -213,6 +230,7 @@ class MultiStep:
             _friction(robot),
             nothing_known(),
             no_slip(robot.n_cables, still.size),
+            no_gain(still.size - 3 * FIXED, robot.n_cables),
         )
         self._solved = False
         self._fresh = int(settings.offset is not None and settings.offset.from_start)
@@ -250,7 +268,7 @@ class MultiStep:
             turn=turn(self._turn, at.dither.amplitude), drives=DriveLag(estimate.lag, self._dead_time)
         )
         if self._fresh > 0:  # the robot rests: all of its deviation is offset, on the mean
-            memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0 / self._fresh, turn=0.0)
+            memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0 / self._fresh, turn=0.0, rests=True)
         outcome, stable, free, gain = forecast(
             robot.model, self._load, self._work, memory, now, self.grid, robot.tip, tuning
         )
@@ -261,7 +279,9 @@ class MultiStep:
         reason = "" if good else "the model has no stable equilibrium at the present drives"
         at_rest = None
         if self._feedforward:
-            at_rest = pose.drive_gain(memory.at.equilibrium, memory.at.gain, robot.tip)[:6]
+            at_rest = pose.drive_gain(memory.at.equilibrium, memory.at.gain + memory.learnt.gain, robot.tip)[
+                :6
+            ]
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)
 
 

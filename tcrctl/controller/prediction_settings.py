@@ -39,6 +39,17 @@ class HoleDragSettings(Settings):
     follow_s: float = quantity("s", "time constant with which the drag follows the motion", 0.03, ge=0)
 
 
+class RestGainSettings(Settings):
+    """Learns how the offset goes with the drives: robots move further, or less far, than their models."""
+
+    noise_mm: float = quantity("mm", "error of the place that the robot vibrates about", 4.0, gt=0)
+    doubt: float = quantity("m/m", "by how much a drive may move the end further, usually", 1.0, gt=0)
+    most: float = quantity(
+        "m/m", "by how much a drive is believed to move the end further, at most", 3.0, gt=0
+    )
+    forget_s: float = quantity("s", "time constant after which it is forgotten", 30.0, gt=0)
+
+
 class MultiStepSettings(Settings):
     """Linear response over the horizon, or with ``model: static`` the static answer to the drives."""
 
@@ -59,6 +70,10 @@ class MultiStepSettings(Settings):
     hole_drag: OrOff[HoleDragSettings] = Field(
         default=HoleDragSettings(),
         description="what is left of the friction of dithered cables, or off; model: dynamic only",
+    )
+    rest_gain: OrOff[RestGainSettings] = Field(
+        default=RestGainSettings(),
+        description="how the offset goes with the drives, learnt, or off; model: dynamic only",
     )
     feedforward: bool = Field(
         default=True,
@@ -87,6 +102,8 @@ class MultiStepSettings(Settings):
             yield ("hole_drag",), "has no meaning with model: static; leave it out"
         if model == "static" and self.modes != MODES:
             yield ("modes",), "has no meaning with model: static; leave it out"
+        if model == "static" and self.rest_gain != RestGainSettings():
+            yield ("rest_gain",), "has no meaning with model: static; leave it out"
         if model == "static" and self.tension_gap != TensionGapSettings():
             yield ("tension_gap",), "has no meaning with model: static; leave it out"
         if model == "static" and self.offset is not None and not self.offset.from_start:

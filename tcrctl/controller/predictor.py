@@ -13,6 +13,7 @@ from tcrctl.controller.drive_lag import DriveLag
 from tcrctl.controller.inner_map import Linearisable
 from tcrctl.controller.ioc import Prediction
 from tcrctl.controller.plan import Situation
+from tcrctl.controller.rest_gain import GainLearning
 from tcrctl.robot.statics import SHARP, TOLERANCE
 from tcrctl.signals import Array
 
@@ -50,6 +51,8 @@ class Tuning(NamedTuple):
         learning: How the drag is learnt.
         drives: Their lag.
         follow: Time constant with which drag follows the slip [s].
+        gain: How it is learnt where the offset goes with the drives.
+        rests: The robot is known to rest: the offset is filtered, and nothing is learnt.
     """
 
     period: float
@@ -59,10 +62,12 @@ class Tuning(NamedTuple):
     learning: Learning = Learning(0.0, 0.0, 0.0, 0.0, 0.0)
     drives: DriveLag = DriveLag(0.0, 0.0)
     follow: float = 0.0
+    gain: GainLearning = GainLearning()
+    rests: bool = False
 
     def sharp(self) -> Tuning:
-        """Return the same with solutions that are exact to rounding."""
-        return self._replace(tolerance=SHARP)
+        """Return the same with solutions that are exact to rounding, and nothing learnt any more."""
+        return self._replace(tolerance=SHARP, gain=GainLearning())
 
 
 def make_tuning(period: float, filter_s: float | None) -> Tuning:

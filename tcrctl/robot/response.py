@@ -44,10 +44,12 @@ class Release(NamedTuple):
     Attributes:
         offset: Displacement from the point that it will come to rest at (3 n_nodes,) [m].
         v: Node velocities (3 n_nodes,) [m/s].
+        gain: By how much more than the model's that point moves with every drive (n_free, m).
     """
 
     offset: Array
     v: Array
+    gain: Array
 
 
 class Drag(NamedTuple):
@@ -227,6 +229,7 @@ def respond(
     reduced = _project(ws, V, GV)
     a = b * b + model.damping * b
     pull = _pull(model, ws, V, GV, drag, h)
+    unseen = _pull_further(model.mass, V, reduced, release.gain, GV, pull)
     for i in range(r):
         reduced[i, i] += a
         for j in range(r):
@@ -243,7 +246,25 @@ def respond(
         step(reduced, model.damping, n * h, h, pull, x, vx)
         _observe(CV, GV, ws.axial, n * h + h, x, change[n])
         change[n] -= start
+        for cable in range(m):
+            for c in range(m):
+                change[n, POSE_ROWS + cable, c] -= ws.axial[cable] * unseen[cable, c] * (n * h + h)
     return change, True
+
+
+@njit(cache=True, error_model="numpy")
+def _pull_further(mass: Array, V: Array, stiffness: Array, gain: Array, GV: Array, pull: Pull) -> Array:
+    """Let unit ramps end where they do with ``gain`` (n_free, m) more; return the cable lengths of it (m, m).
+
+    The forces that do it are those of the basis' stiffness (r, r). Cables do not feel them: what they would be
+    longer by is no tension, because the cables of the robot are as long as their drives say.
+    """
+    weighted = np.empty(gain.shape)
+    mass_columns(mass, gain, weighted)
+    further = np.dot(V.T, weighted)
+    pull.growing[:, : gain.shape[1]] += np.dot(stiffness, further)
+    lengths: Array = np.dot(GV, further)
+    return lengths
 
 
 @njit(cache=True, error_model="numpy")

@@ -50,12 +50,13 @@ class Bent:
         assert linear.factor_shifted(ws.K, ws.U) == 0.0
         return ws
 
-    def respond(self, offset, v, step, steps, drag=None, held=None, turn=0.0):
+    def respond(self, offset, v, step, steps, drag=None, held=None, turn=0.0, gain=None):
         held = np.zeros(self.basis.shape[0]) if held is None else held
+        gain = np.zeros((held.size, self.robot.n_cables)) if gain is None else gain
         change, stable = response.respond(
             self.model,
             self.rest.q,
-            response.Release(offset, v),
+            response.Release(offset, v, gain),
             instants(step, steps),
             self.robot.tip,
             self.workspace(),
@@ -186,13 +187,27 @@ def test_a_slack_cable_keeps_its_authority_over_its_predicted_tension(tcr700):
     ws = bent.workspace()
     ws.axial[1] = 0.0  # as if cable 2 were slack
     still = np.zeros_like(bent.rest.q)
-    release, ahead = response.Release(still, still), instants(0.02, 5)
+    no_more = np.zeros((bent.basis.shape[0], tcr700.n_cables))
+    release, ahead = response.Release(still, still, no_more), instants(0.02, 5)
     drag = response.Drag(no_drag(bent.model), still[FREE:], 0.0)
     change, stable = response.respond(
         bent.model, bent.rest.q, release, ahead, tcr700.tip, ws, bent.basis.copy(), drag
     )
     assert stable
     assert change[-1, 7 + 1, 1] > 0.0
+
+
+def test_ramps_go_further_by_the_gain_that_the_model_lacks_and_cables_stay_as_long(tcr700):
+    bent, part = Bent(tcr700), 0.4
+    still = np.zeros_like(bent.rest.q)
+    plain = bent.respond(still, still, 0.2, 300)
+    further = bent.respond(still, still, 0.2, 300, gain=part * bent.rest.gain)
+    went = plain[-1, :6, :-1] - plain[-101, :6, :-1]
+    goes = further[-1, :6, :-1] - further[-101, :6, :-1]
+    np.testing.assert_allclose(goes, (1.0 + part) * went, atol=0.02 * np.abs(went).max())
+    np.testing.assert_array_equal(further[:, :, -1], plain[:, :, -1])
+    rise, rises = plain[-1, 7:] - plain[-101, 7:], further[-1, 7:] - further[-101, 7:]
+    np.testing.assert_allclose(rises, rise, atol=0.02 * np.abs(rise).max())
 
 
 def dragged(bent):
