@@ -36,7 +36,7 @@ def driven(size=0.02):
 
 
 def test_the_gain_is_found_and_the_offset_does_not_lag():
-    learning, deaf = Filter(noise_mm=0.5), Filter(doubt=1e-6)
+    learning, deaf = Filter(noise_mm=0.5, forget_s=3000.0), Filter(doubt=1e-6)
     late, lag = [], []
     for drive in driven():
         late.append(learning.step(drive, TRUE @ drive) - TRUE @ drive)
@@ -71,7 +71,7 @@ def test_what_is_as_the_model_says_teaches_nothing():
 
 
 def test_drives_that_move_together_share_what_they_do():
-    learning = Filter(noise_mm=0.5)
+    learning = Filter(noise_mm=0.5, forget_s=3000.0)
     for way in 0.02 * np.sin(0.4 * T):
         learning.step(np.array([way, way, 0.0]), np.full(FREE, way))
     np.testing.assert_allclose(learning.known.gain[:, 0], learning.known.gain[:, 1], rtol=1e-6)
