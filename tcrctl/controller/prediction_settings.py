@@ -42,12 +42,12 @@ class HoleDragSettings(Settings):
 class RestGainSettings(Settings):
     """Learns how the offset goes with the drives: robots move further, or less far, than their models."""
 
-    noise_mm: float = quantity("mm", "error of the place that the robot vibrates about", 4.0, gt=0)
+    noise_mm: float = quantity("mm", "error of the place that the robot vibrates about", 8.0, gt=0)
     doubt: float = quantity("m/m", "by how much a drive may move the end further, usually", 1.0, gt=0)
     most: float = quantity(
         "m/m", "by how much a drive is believed to move the end further, at most", 3.0, gt=0
     )
-    forget_s: float = quantity("s", "time constant after which it is forgotten", 30.0, gt=0)
+    forget_s: float = quantity("s", "time constant after which it is forgotten", 300.0, gt=0)
 
 
 class MultiStepSettings(Settings):
@@ -72,8 +72,7 @@ class MultiStepSettings(Settings):
         description="what is left of the friction of dithered cables, or off; model: dynamic only",
     )
     rest_gain: OrOff[RestGainSettings] = Field(
-        default=RestGainSettings(),
-        description="how the offset goes with the drives, learnt, or off; model: dynamic only",
+        default=None, description="how the offset goes with the drives, learnt, or off; model: dynamic only"
     )
     feedforward: bool = Field(
         default=True,
@@ -102,7 +101,7 @@ class MultiStepSettings(Settings):
             yield ("hole_drag",), "has no meaning with model: static; leave it out"
         if model == "static" and self.modes != MODES:
             yield ("modes",), "has no meaning with model: static; leave it out"
-        if model == "static" and self.rest_gain != RestGainSettings():
+        if model == "static" and self.rest_gain is not None:
             yield ("rest_gain",), "has no meaning with model: static; leave it out"
         if model == "static" and self.tension_gap != TensionGapSettings():
             yield ("tension_gap",), "has no meaning with model: static; leave it out"

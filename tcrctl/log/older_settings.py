@@ -16,8 +16,6 @@ _MEANT: Final = {
     ("static", "multi_step"): ("horizon_s", "instants", "blocks", "offset", "feedforward"),
     ("dynamic", "one_step"): ("horizon_s",),
 }
-#: Keys of ``multi_step`` that logs of before may lack: they ran without.
-_LATER: Final = ("tension_gap", "hole_drag", "rest_gain")
 
 
 def in_todays_form(settings: Any) -> Any:
@@ -62,13 +60,7 @@ def _without_news(controller: dict[str, Any]) -> dict[str, Any]:
     if isinstance(prediction, str):
         prediction = {"kind": prediction}
     if dynamic and isinstance(prediction, dict) and prediction.get("kind", "multi_step") == "multi_step":
-        prediction = {
-            "kind": "multi_step",
-            "tension_gap": "off",
-            "hole_drag": "off",
-            "rest_gain": "off",
-            **prediction,
-        }
+        prediction = {"kind": "multi_step", "tension_gap": "off", "hole_drag": "off", **prediction}
         offset = prediction.get("offset", {})
         if isinstance(offset, dict):
             prediction["offset"] = {"from_start": False, **offset}
