@@ -30,8 +30,9 @@ from tcrctl.emulate.imperfections import Imperfections
 from tcrctl.emulate.robot import EmulatedRobot
 from tcrctl.emulate.settings import EmulationSettings
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.plant.rig.natnet_cameras import transform
+from tcrctl.plant.rig.mounting import transform
 from tcrctl.plant.rig.settings import CableDrive, ModbusTcp, MountedRobot, RigFile
+from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.signals import Array
@@ -72,6 +73,10 @@ class EmulatedBench:
         """
         self._rig = rig
         self._settings = settings
+        if plugin_of(rig.cameras) is not None:
+            raise InputError(
+                "only NatNet cameras are emulated from a rig file", hint="Use cameras.kind: natnet."
+            )
         built = robots or {}
         self._random = np.random.default_rng(settings.seed)
         self._failure: Exception | None = None

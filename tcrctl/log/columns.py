@@ -4,7 +4,8 @@
 (n_steps, 3); ``truth.q`` is ``truth_q``, and so on for every field of every record. Units are those of the
 record, all SI (:data:`COLUMNS`). Where a step has no value (no normal in position-only tracking, fewer
 prediction instants than others, no full state in a lean step, no camera frame in time) floats are NaN, integers -1,
-bools False. Columns of ``truth`` (simulated plants) and ``measurement.raw`` (rigs) exist only if a step has them.
+bools False, texts empty. Columns of ``truth`` (simulated plants) and ``measurement.raw`` (rigs) exist only if a
+step has them.
 """
 
 from __future__ import annotations
@@ -138,7 +139,7 @@ def _value(step: StepRecord, path: list[str]) -> Any:
 
 def _stacked(column: Column, values: list[Any]) -> NDArray[Any]:
     if column.kind == "string":
-        return np.array(values, dtype=np.str_)
+        return np.array(["" if value is None else value for value in values], dtype=np.str_)
     dtype = _DTYPES[column.kind]
     if not column.kind.endswith("[]"):
         lacking = np.nan if dtype is np.float64 else -1

@@ -86,6 +86,7 @@ MESSAGES: Final[dict[str, tuple[Field, ...]]] = {
         Field("ids", "int32[]"),
         Field("positions", "float[]", "m", width=3),
         Field("flags", "int32[]"),
+        Field("names", "string", optional=True),
     ),
     "Estimate": (
         Field("t", "double", "s"),

@@ -9,8 +9,13 @@ from pathlib import Path
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.strict_yaml import Document
-from tcrctl.errors import InputError
+from tcrctl.errors import InputError, TcrctlError
+from tcrctl.log.file_names import PLUGINS, RIG
+from tcrctl.plant.rig.plugged import device_origins, with_devices
 from tcrctl.plant.rig.settings import MountedRobot, RigFile
+from tcrctl.plugins.faults import told
+from tcrctl.plugins.origin import Origin
+from tcrctl.plugins.trust import Trust
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.module import is_ring_node, module_of, node_index
 
@@ -36,6 +41,11 @@ class LoadedRig:
         """What the file says about the robot."""
         return self.rig.robots[self.robot]
 
+    @property
+    def origins(self) -> tuple[Origin, ...]:
+        """Where its cameras and drives come from, as far as they are not built in."""
+        return device_origins(self.rig, self.robot)
+
 
 def read_rig(name_or_path: str, folder: Path | None = None) -> tuple[RigFile, Path, bytes, Document]:
     """Read a rig file.
@@ -52,7 +62,22 @@ def read_rig(name_or_path: str, folder: Path | None = None) -> tuple[RigFile, Pa
     path = shipped.find_rig(name_or_path, folder)
     given = strict_yaml.read(path)
     document = strict_yaml.loads(given, str(path))
-    return strict_yaml.validate(document, RigFile), path, given, document
+    model = with_devices(document, _trust_of(path))
+    return _validated(document, model), path, given, document
+
+
+def _trust_of(path: Path) -> Trust:
+    """Return where the files of kinds are: in the folder of a run beside the rig file, all of them."""
+    return Trust(path.parent, by_name=path.name == RIG and (path.parent / PLUGINS).is_file())
+
+
+def _validated(document: Document, model: type[RigFile]) -> RigFile:
+    try:
+        return strict_yaml.validate(document, model)
+    except TcrctlError:
+        raise
+    except Exception as error:  # a validator from elsewhere raised what none may
+        raise InputError(f"{document.name}: its settings could not be checked: {told(error, '')}") from error
 
 
 def load_rig(name_or_path: str, robot: RobotDescription, folder: Path | None = None) -> LoadedRig:

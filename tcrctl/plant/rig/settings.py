@@ -17,7 +17,22 @@ Port: TypeAlias = Annotated[int, Field(ge=1, le=65535)]
 Host: TypeAlias = Annotated[str, Field(min_length=1, description="host name or address")]
 
 
-class CameraSettings(Settings):
+class CameraSection(Settings):
+    """What every ``cameras:`` section can be asked, whatever its kind."""
+
+    up_axis: Literal["y", "z"] = Field(
+        default="y", description="axis of the cameras that points up; only for rig calibrate"
+    )
+
+
+class DriveSection(Settings):
+    """What every ``plc:`` section can be asked, whatever moves the cables."""
+
+    #: What ``tcrctl rig check`` calls drives that do not answer.
+    called: ClassVar[str] = "drives"
+
+
+class CameraSettings(CameraSection):
     """An OptiTrack system that streams over NatNet."""
 
     kind: Literal["natnet"]
@@ -32,7 +47,6 @@ class CameraSettings(Settings):
     )
     allow_newer: bool = Field(default=False, description="decode versions newer than those that were tested")
     rate_hz: float | None = quantity("Hz", "frames per second; null: the server is asked", None, gt=0)
-    up_axis: Literal["y", "z"] = Field(default="y", description="as set in Motive; only for rig calibrate")
     jump_gate_mm: float = quantity(
         "mm", "a marker that has jumped further is not used; less than half the marker distance", 24.0, gt=0
     )
@@ -99,7 +113,9 @@ class Calibration(Settings):
         return self
 
 
-class _Plc(Settings):
+class _Plc(DriveSection):
+    called: ClassVar[str] = "PLC"
+
     unit: int = Field(default=1, ge=0, le=247, description="Modbus unit (slave) number")
     timeout_ms: float = quantity("ms", "how long an answer is waited for", 60.0, gt=0, le=1000)
     retries: int = Field(
