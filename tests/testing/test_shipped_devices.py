@@ -6,8 +6,12 @@ import pytest
 
 from support.fault_matrix import FEW, WatchedEmulators
 from tcr_hardware.emulators.motive_settings import MotiveSettings
+from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
+from tcr_hardware.emulators.plc_limits import PlcLimitSettings
 from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
-from tcrctl.plant.rig.mounting import mounting
+from tcrctl.plant.rig.modbus_drives import ModbusDrives
+from tcrctl.plant.rig.mounting import CableAxis, mounting
+from tcrctl.plant.rig.settings import ModbusRtu
 from tcrctl.testing import CameraBench, CameraConformance, DriveBench, DriveConformance
 
 pytestmark = pytest.mark.slow
@@ -40,20 +44,39 @@ class TestNatNetCameras(CameraConformance):
         )
 
 
-class TestModbusDrives(DriveConformance):
+def drive_bench(plc, open_drives):
+    def hook(name):
+        return lambda wrong: plc.faults.set(name) if wrong else plc.faults.clear(name)
+
+    return DriveBench(
+        open=open_drives,
+        cables=len(NAMES),
+        answer=2 * LATE,
+        stop=4 * LATE,
+        emulated=True,
+        silence=hook("silence"),
+        estop=hook("estop"),
+    )
+
+
+class TestModbusTcpDrives(DriveConformance):
     @pytest.fixture
     def bench(self, emulators):
-        faults, loaded = emulators.plc.faults, emulators.loaded()
+        loaded = emulators.loaded()
+        return drive_bench(emulators.plc, lambda: connect_drives(loaded, NAMES))
 
-        def hook(name):
-            return lambda wrong: faults.set(name) if wrong else faults.clear(name)
 
-        return DriveBench(
-            open=lambda: connect_drives(loaded, NAMES),
-            cables=len(NAMES),
-            answer=2 * LATE,
-            stop=4 * LATE,
-            emulated=True,
-            silence=hook("silence"),
-            estop=hook("estop"),
-        )
+class TestModbusRtuDrives(DriveConformance):
+    """Over a pseudo-terminal; the second axis counts the other way."""
+
+    @pytest.fixture
+    def bench(self):
+        limits = PlcLimitSettings(min_um=-25_000, max_um=25_000, watchdog_ms=1000)
+        plc = PlcEmulator(PlcSettings(limits=limits))
+        plc.start(tcp=None, rtu="pty")
+        line = ModbusRtu(kind="modbus_rtu", device=plc.device, timeout_ms=200.0)
+        cables = [
+            CableAxis(name, i, -1 if i == 2 else 1, -20_000, 20_000, 5e4) for i, name in enumerate(NAMES, 1)
+        ]
+        yield drive_bench(plc, lambda: ModbusDrives(line, tuple(cables)))
+        plc.stop()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -37,6 +38,8 @@ _HOPELESS: Final = (ImplausibleAnswerError, PlcFrozenError)
 FOREIGN: Final = 0x100
 #: So many calls in a row with answers that were not for us: no late answer of a serial line.
 STRANGE: Final = 3
+#: What an exchange over a serial line has said is the status for so long [s]; a loop is faster, or has time to ask.
+RECENT: Final = 0.1
 #: Section and link of every ``plc.kind``.
 LINKS: Final[Mapping[str, tuple[type[Settings], Callable[[Any], TcpLink | RtuLink]]]] = {
     "modbus_tcp": (ModbusTcp, lambda plc: TcpLink(plc.host, plc.port)),
@@ -104,6 +107,7 @@ class ModbusDrives:
             self.bus.close()
             raise
         self._last: DriveStatus | None = None
+        self._exchanged = -math.inf
         self._mine: bool | None = None  # not known before the first exchange
         self._strange = self._stale = 0
 
@@ -139,8 +143,9 @@ class ModbusDrives:
         return float(self._call(lambda: self.bus.check_period(period)))
 
     def status(self) -> DriveStatus:
-        """Read the status; over a serial line, where that costs wire time, what the last exchange said."""
-        if self._last is not None and not self._asks:
+        """Read the status; over a serial line, where that costs wire time, what an exchange has said just now."""
+        recent = time.monotonic() - self._exchanged < RECENT
+        if self._last is not None and recent and not self._asks:
             return self._last
         return self._translated(self._asked(self.bus.read_status))
 
@@ -162,7 +167,7 @@ class ModbusDrives:
             block[axis] = int(value)
         bits = _bits(control)
         answer = self._asked(lambda: self.bus.exchange(block, bits, self._speed))
-        self._last = self._translated(answer)
+        self._last, self._exchanged = self._translated(answer), time.monotonic()
         return self._last
 
     def _asked(self, action: Callable[[], Any]) -> Any:
