@@ -27,11 +27,12 @@ from tcr_hardware.errors import HardwareError
 from tcr_hardware.rigid_transform import RigidTransform
 from tcrctl.emulate.fault_script import FaultPlayer, FaultScript
 from tcrctl.emulate.imperfections import Imperfections
+from tcrctl.emulate.line import open_line
 from tcrctl.emulate.robot import EmulatedRobot
 from tcrctl.emulate.settings import EmulationSettings
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.mounting import transform
-from tcrctl.plant.rig.settings import CableDrive, ModbusTcp, MountedRobot, RigFile
+from tcrctl.plant.rig.settings import CableDrive, MountedRobot, RigFile
 from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.robot import Robot, build_robot
@@ -73,10 +74,7 @@ class EmulatedBench:
         """
         self._rig = rig
         self._settings = settings
-        if plugin_of(rig.cameras) is not None:
-            raise InputError(
-                "only NatNet cameras are emulated from a rig file", hint="Use cameras.kind: natnet."
-            )
+        _refuse_others(rig)
         built = robots or {}
         self._random = np.random.default_rng(settings.seed)
         self._failure: Exception | None = None
@@ -146,15 +144,16 @@ class EmulatedBench:
         """
         try:
             for name, plc in self.plcs.items():
-                plc.start(tcp=_address(self._rig.robots[name]))
-                self._opened.callback(plc.stop)
+                open_line(plc, self._rig.robots[name].plc, self._opened)
             self.motive.start()
             self._opened.callback(self.motive.stop)
-        except (HardwareError, OSError) as error:
+        except BaseException as error:
             self._opened.close()
-            raise DeviceError(
-                f"the bench cannot be emulated: {error}", hint=getattr(error, "hint", "")
-            ) from error
+            self.motive.stop()  # its port is taken since it was built
+            if isinstance(error, HardwareError | OSError):
+                hint = getattr(error, "hint", "")
+                raise DeviceError(f"the bench cannot be emulated: {error}", hint=hint) from error
+            raise
         return self
 
     def __exit__(
@@ -162,6 +161,14 @@ class EmulatedBench:
     ) -> None:
         """Close them."""
         self._opened.close()
+
+    @property
+    def places(self) -> dict[str, str]:
+        """Where the PLC of every robot is found."""
+        tcp = {
+            name: f"{plc.address[0]}:{plc.address[1]}" for name, plc in self.plcs.items() if plc.address[1]
+        }
+        return {name: tcp.get(name, mounted.plc.place) for name, mounted in self._rig.robots.items()}
 
     def check(self) -> None:
         """Do nothing, unless a simulation broke down.
@@ -214,13 +221,18 @@ def emulate(
         time.sleep(TICK)
 
 
-def _address(mounted: MountedRobot) -> tuple[str, int]:
-    plc = mounted.plc
-    if not isinstance(plc, ModbusTcp):
+def _refuse_others(rig: RigFile) -> None:
+    """Refuse devices from elsewhere: only their authors know how to emulate them."""
+    hint = "Emulate them by a program of your own; the other devices need a rig file with shipped kinds."
+    if plugin_of(rig.cameras) is not None:
         raise InputError(
-            "only PLCs on Modbus TCP are emulated from a rig file", hint="Use plc.kind: modbus_tcp."
+            f"only NatNet cameras are emulated from a rig file, not {rig.cameras.kind}", hint=hint
         )
-    return plc.host, plc.port
+    for mounted in rig.robots.values():
+        if plugin_of(mounted.plc) is not None:
+            raise InputError(
+                f"only PLCs on Modbus are emulated from a rig file, not {mounted.plc.kind}", hint=hint
+            )
 
 
 def marker_names(rig: RigFile) -> list[str]:
