@@ -159,7 +159,12 @@ def steps(draw: st.DrawFn) -> StepRecord:
             draw(_bits(np.float32, 3 * p)).reshape(p, 3),
             bools(p),
             doubles(m),
-            RawFrame(*frames, draw(_bits(np.float32, 3 * r)).reshape(r, 3), integers(r))
+            RawFrame(
+                *frames,
+                draw(_bits(np.float32, 3 * r)).reshape(r, 3),
+                integers(r),
+                draw(st.none() | st.text(max_size=5)),
+            )
             if optional[4]
             else None,
         ),

@@ -135,6 +135,19 @@ def test_a_loaded_bench_goes_to_another_process_and_back(bench):
     assert [origin.kind for origin in again.origins] == ["./devices.py:CAMERAS", "./devices.py:DRIVES"]
 
 
+def test_show_fills_in_their_defaults_and_what_it_prints_loads_again(bench, capsys):
+    path = bench().path
+    assert main(["show", "--rig", str(path)]) == 0
+    text = capsys.readouterr().out
+    assert "rate_hz: 200.0" in text
+    assert "watchdog_ms: 500.0" in text
+    before = read_rig(str(path))[0]
+    path.write_text(text)
+    assert read_rig(str(path))[0] == before
+    assert main(["show", "--rig", str(path), "--set", "name=x"]) == 2
+    assert "--rig goes with neither" in capsys.readouterr().err
+
+
 REFUSED = {
     "no file": ("", "", "devices.py:CAMERAS", "other.py:CAMERAS", "other.py: cannot be read"),
     "no name": (
