@@ -27,12 +27,13 @@ from tcr_hardware.errors import HardwareError
 from tcr_hardware.rigid_transform import RigidTransform
 from tcrctl.emulate.fault_script import FaultPlayer, FaultScript
 from tcrctl.emulate.imperfections import Imperfections
-from tcrctl.emulate.line import open_line
+from tcrctl.emulate.line import EmulatedDrives, open_line
 from tcrctl.emulate.robot import EmulatedRobot
 from tcrctl.emulate.settings import EmulationSettings
+from tcrctl.emulate.winches import EmulatedWinches
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.mounting import transform
-from tcrctl.plant.rig.settings import CableDrive, MountedRobot, RigFile
+from tcrctl.plant.rig.settings import CableDrive, Dynamixel, MountedRobot, RigFile
 from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.robot import Robot, build_robot
@@ -78,7 +79,7 @@ class EmulatedBench:
         built = robots or {}
         self._random = np.random.default_rng(settings.seed)
         self._failure: Exception | None = None
-        self.plcs: dict[str, PlcEmulator] = {}
+        self.plcs: dict[str, EmulatedDrives] = {}
         self.robots: dict[str, EmulatedRobot] = {}
         self._real: dict[str, Imperfections] = {}
         self._back: dict[str, RigidTransform] = {}
@@ -86,7 +87,7 @@ class EmulatedBench:
         for name, mounted in rig.robots.items():
             robot = built[name] if name in built else build_robot(load_robot(name))
             real = Imperfections(name, robot, settings.mismatch, settings.realistic, settings.seed)
-            self.plcs[name] = PlcEmulator(_plc_settings(mounted, settings, real))
+            self.plcs[name] = _drives(mounted, settings, real)
             self.robots[name] = self._moved(name, mounted, real)
             self._real[name] = real
             self._back[name] = transform(mounted.calibration)
@@ -165,10 +166,12 @@ class EmulatedBench:
     @property
     def places(self) -> dict[str, str]:
         """Where the PLC of every robot is found."""
-        tcp = {
-            name: f"{plc.address[0]}:{plc.address[1]}" for name, plc in self.plcs.items() if plc.address[1]
-        }
-        return {name: tcp.get(name, mounted.plc.place) for name, mounted in self._rig.robots.items()}
+        found = {}
+        for name, mounted in self._rig.robots.items():
+            plc = self.plcs[name]
+            host, port = plc.address if isinstance(plc, PlcEmulator) else ("", 0)
+            found[name] = f"{host}:{port}" if port else mounted.plc.place
+        return found
 
     def check(self) -> None:
         """Do nothing, unless a simulation broke down.
@@ -222,7 +225,7 @@ def emulate(
 
 
 def _refuse_others(rig: RigFile) -> None:
-    """Refuse devices from elsewhere: only their authors know how to emulate them."""
+    """Refuse devices of other kinds."""
     hint = "Emulate them by a program of your own; the other devices need a rig file with shipped kinds."
     if plugin_of(rig.cameras) is not None:
         raise InputError(
@@ -230,9 +233,7 @@ def _refuse_others(rig: RigFile) -> None:
         )
     for mounted in rig.robots.values():
         if plugin_of(mounted.plc) is not None:
-            raise InputError(
-                f"only PLCs on Modbus are emulated from a rig file, not {mounted.plc.kind}", hint=hint
-            )
+            raise InputError(f"only shipped kinds of drives are emulated, not {mounted.plc.kind}", hint=hint)
 
 
 def marker_names(rig: RigFile) -> list[str]:
@@ -261,12 +262,21 @@ def _labels(mounted: MountedRobot, modules: int) -> list[str]:
     return base + [markers.labels.format(ring=ring, node=node) for ring in rings for node in (1, 2, 3)]
 
 
-def _plc_settings(mounted: MountedRobot, settings: EmulationSettings, real: Imperfections) -> PlcSettings:
+def _drives(mounted: MountedRobot, settings: EmulationSettings, real: Imperfections) -> EmulatedDrives:
+    plc = mounted.plc
+    if isinstance(plc, Dynamixel):
+        return EmulatedWinches(plc, tuple(cable.axis for cable in mounted.cables.values()))
+    return PlcEmulator(_plc_settings(plc.unit, mounted, settings, real))
+
+
+def _plc_settings(
+    unit: int, mounted: MountedRobot, settings: EmulationSettings, real: Imperfections
+) -> PlcSettings:
     ranges = [_axis_range(cable) for cable in mounted.cables.values()]
     axes = max(6, *(cable.axis for cable in mounted.cables.values()))
     return PlcSettings(
         axes=axes,
-        unit=mounted.plc.unit,
+        unit=unit,
         servo=real.servos(mounted, axes),
         limits=PlcLimitSettings(
             min_um=min(low for low, _ in ranges) - MARGIN,

@@ -75,5 +75,5 @@ def test_devices_that_are_plug_ins_cannot_be_emulated_and_say_so(rig, tcr600, tm
     data = strict_yaml.load(path).data
     data["robots"]["tcr600"]["plc"] = {"kind": "./own.py:DRIVES"}
     path.write_text(strict_yaml.dumps(data))
-    with pytest.raises(InputError, match="only PLCs on Modbus are emulated"), bench(path, tcr600):
+    with pytest.raises(InputError, match="only shipped kinds of drives"), bench(path, tcr600):
         pass

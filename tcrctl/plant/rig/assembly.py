@@ -8,14 +8,14 @@ from tcrctl.errors import InputError
 from tcrctl.plant.rig.devices import Cameras, Drives
 from tcrctl.plant.rig.file import LoadedRig
 from tcrctl.plant.rig.health import Rules
-from tcrctl.plant.rig.mounting import Mounting, cable_axes, mounting
+from tcrctl.plant.rig.mounting import CableAxis, Mounting, cable_axes, mounting
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.own_cameras import OwnCameras
 from tcrctl.plant.rig.own_drives import OwnDrives
 from tcrctl.plant.rig.own_limits import check_drives
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
-from tcrctl.plant.rig.settings import MountedRobot, SafetyRules
+from tcrctl.plant.rig.settings import Dynamixel, MountedRobot, SafetyRules
 from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot
@@ -96,9 +96,22 @@ def connect_drives(loaded: LoadedRig, names: tuple[str, ...]) -> Drives:
     plugin = plugin_of(settings)
     if plugin is not None:
         return OwnDrives(settings, plugin, cables)
+    if isinstance(settings, Dynamixel):
+        return _dynamixel(settings, cables)
     from tcrctl.plant.rig.modbus_drives import ModbusDrives
 
     return ModbusDrives(settings, cables)
+
+
+def _dynamixel(settings: Dynamixel, cables: tuple[CableAxis, ...]) -> Drives:
+    try:
+        from tcrctl.plant.rig.dynamixel_drives import DynamixelDrives
+    except ModuleNotFoundError as error:
+        if error.name != "dynamixel_sdk":
+            raise
+        hint = "Install it: pip install 'tcrctl[dynamixel]'."
+        raise InputError("plc.kind: dynamixel needs the package dynamixel-sdk", hint=hint) from error
+    return DynamixelDrives(settings, cables)
 
 
 def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operation) -> RigPlant:

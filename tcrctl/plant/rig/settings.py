@@ -162,6 +162,31 @@ class ModbusRtu(_Plc):
         return self.device
 
 
+class Dynamixel(DriveSection):
+    """Dynamixel motors of the X series, one per cable; ``axis`` is the number of the motor (extra dynamixel)."""
+
+    called: ClassVar[str] = "Dynamixel bus"
+
+    kind: Literal["dynamixel"]
+    device: str = Field(min_length=1, description="for instance /dev/ttyUSB0")
+    baud: int = Field(default=1_000_000, ge=9600)
+    timeout_ms: float = quantity("ms", "how long an answer is waited for", 20.0, gt=0, le=1000)
+    mm_per_turn: float = quantity(
+        "mm", "cable per turn of the drum; the whole stroke has to fit in a turn", gt=0
+    )
+    zero_tick: int = Field(default=1024, ge=0, le=4095, description="position of the motors at tension-zero")
+    watchdog_ms: float = quantity("ms", "bus watchdog, in steps of 20", 200.0, ge=20, le=2520)
+    current_limit_ma: float | None = quantity(
+        "mA", "largest current, in operating mode 5; null: mode 3, without", None, gt=0
+    )
+    current_unit_ma: float = quantity("mA", "unit of the model's goal current", 2.69, gt=0)
+
+    @property
+    def place(self) -> str:
+        """Where they are, for messages."""
+        return self.device
+
+
 class CableDrive(Settings):
     """The drive of one cable."""
 
@@ -183,7 +208,7 @@ class Antagonists(Settings):
 class MountedRobot(Settings):
     """One robot on this bench: its drives, its markers, where it hangs."""
 
-    plc: Annotated[ModbusTcp | ModbusRtu, Field(discriminator="kind")]
+    plc: Annotated[ModbusTcp | ModbusRtu | Dynamixel, Field(discriminator="kind")]
     cables: dict[str, CableDrive] = Field(
         min_length=1, description="drive of every cable of the robot, by name"
     )
