@@ -27,6 +27,8 @@ from tcrctl.plant.rig.settings import Dynamixel
 STILL: Final = 2
 #: The watchdog has tripped so long after its time, if it has [s].
 MARGIN: Final = 0.1
+#: Every packet feeds the bus watchdog, so after an exchange motors are only read for this share of its time.
+READABLE: Final = 0.4
 
 
 class DynamixelDrives:
@@ -53,8 +55,10 @@ class DynamixelDrives:
         except BaseException:
             self._bus.close()
             raise
-        self._ticks = math.ceil(settings.watchdog_ms / (1e3 * table.WATCHDOG_UNIT) - 1e-9)
-        self.watchdog = self._ticks * table.WATCHDOG_UNIT
+        longest = 1e-3 * settings.watchdog_ms / ((1.0 + READABLE) * table.WATCHDOG_UNIT)
+        self._ticks = max(1, math.floor(longest + 1e-9))
+        self._fed_for = self._ticks * table.WATCHDOG_UNIT
+        self.watchdog = (1.0 + READABLE) * self._fed_for
         models = ", ".join(str(self._bus.models[motor]) for motor in self._ids)
         told = {"models": models, "watchdog": f"{1e3 * self.watchdog:g} ms"}
         self.identity = Identity(
@@ -70,20 +74,26 @@ class DynamixelDrives:
         Raises:
             InputError: If they take longer, or the watchdog is not three periods.
         """
-        share = self._bus.seconds() / period
+        share = 2.0 * self._bus.seconds() / period  # a loop reads, then exchanges
         if share >= 1.0:
-            long = f"an exchange takes {1e3 * self._bus.seconds():.1f} ms, too long"
+            long = f"to read and to exchange takes {2e3 * self._bus.seconds():.1f} ms, too long"
             raise InputError(f"{self._where}: {long}", hint="Raise the baud rate of the motors.")
-        if 3.0 * period > self.watchdog:
-            raise InputError(
-                f"{self._where}: the watchdog has to be at least 3 periods of {1e3 * period:g} ms"
-            )
+        if 3.0 * period > self._fed_for:
+            least = math.ceil(3e3 * (1.0 + READABLE) * period)
+            raise InputError(f"{self._where}: watchdog_ms must be at least {least} for {1e3 * period:g} ms")
         return share
 
     def status(self) -> DriveStatus:
-        """Return what an exchange has said, as long as reading would feed the watchdog; else read."""
-        fed = time.monotonic() - self._exchanged < self.watchdog + MARGIN
-        return self._last if self._last.enabled and fed else self._read()
+        """Read, unless that would feed the watchdog of drives that nobody moves any more; then tell what was.
+
+        Raises:
+            DeviceError: If a motor does not answer.
+        """
+        since = time.monotonic() - self._exchanged
+        tripped_by = self.watchdog + MARGIN
+        if self._last.enabled and READABLE * self._fed_for < since < tripped_by:
+            return self._last
+        return self._read()
 
     def exchange(self, target: NDArray[np.int64], control: DriveControl) -> DriveStatus:
         """Send set-points, or hold, and read how all motors are.

@@ -175,7 +175,9 @@ class Dynamixel(DriveSection):
         "mm", "cable per turn of the drum; the whole stroke has to fit in a turn", gt=0
     )
     zero_tick: int = Field(default=1024, ge=0, le=4095, description="position of the motors at tension-zero")
-    watchdog_ms: float = quantity("ms", "bus watchdog, in steps of 20", 200.0, ge=20, le=2520)
+    watchdog_ms: float = quantity(
+        "ms", "time after which they stop by their bus watchdog, in steps of 28", 300.0, ge=28, le=3500
+    )
     current_limit_ma: float | None = quantity(
         "mA", "largest current, in operating mode 5; null: mode 3, without", None, gt=0
     )
