@@ -21,26 +21,23 @@ import numpy as np
 
 from tcr_hardware.emulators.motive import MotiveEmulator
 from tcr_hardware.emulators.motive_settings import MotiveSettings
-from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
-from tcr_hardware.emulators.plc_limits import PlcLimitSettings
+from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.rigid_transform import RigidTransform
+from tcrctl.emulate.drives import emulated_drives
 from tcrctl.emulate.fault_script import FaultPlayer, FaultScript
 from tcrctl.emulate.imperfections import Imperfections
 from tcrctl.emulate.line import EmulatedDrives, open_line
 from tcrctl.emulate.robot import EmulatedRobot
 from tcrctl.emulate.settings import EmulationSettings
-from tcrctl.emulate.winches import EmulatedWinches
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.mounting import transform
-from tcrctl.plant.rig.settings import CableDrive, Dynamixel, MountedRobot, RigFile
+from tcrctl.plant.rig.settings import MountedRobot, RigFile
 from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.signals import Array
 
-#: The PLC's limits are wider than the soft limits of the rig file by this [um].
-MARGIN: Final = 5000
 #: How often the fault script looks at the time, and the main thread at the signals [s].
 TICK: Final = 0.005
 #: What to do if the port of the cameras cannot be had.
@@ -87,7 +84,7 @@ class EmulatedBench:
         for name, mounted in rig.robots.items():
             robot = built[name] if name in built else build_robot(load_robot(name))
             real = Imperfections(name, robot, settings.mismatch, settings.realistic, settings.seed)
-            self.plcs[name] = _drives(mounted, settings, real)
+            self.plcs[name] = emulated_drives(mounted, settings, real)
             self.robots[name] = self._moved(name, mounted, real)
             self._real[name] = real
             self._back[name] = transform(mounted.calibration)
@@ -260,35 +257,6 @@ def _labels(mounted: MountedRobot, modules: int) -> list[str]:
     base = [markers.base.format(node=node) for node in (1, 2, 3)]
     rings = range(1, modules + 1)
     return base + [markers.labels.format(ring=ring, node=node) for ring in rings for node in (1, 2, 3)]
-
-
-def _drives(mounted: MountedRobot, settings: EmulationSettings, real: Imperfections) -> EmulatedDrives:
-    plc = mounted.plc
-    if isinstance(plc, Dynamixel):
-        return EmulatedWinches(plc, tuple(cable.axis for cable in mounted.cables.values()))
-    return PlcEmulator(_plc_settings(plc.unit, mounted, settings, real))
-
-
-def _plc_settings(
-    unit: int, mounted: MountedRobot, settings: EmulationSettings, real: Imperfections
-) -> PlcSettings:
-    ranges = [_axis_range(cable) for cable in mounted.cables.values()]
-    axes = max(6, *(cable.axis for cable in mounted.cables.values()))
-    return PlcSettings(
-        axes=axes,
-        unit=unit,
-        servo=real.servos(mounted, axes),
-        limits=PlcLimitSettings(
-            min_um=min(low for low, _ in ranges) - MARGIN,
-            max_um=max(high for _, high in ranges) + MARGIN,
-            watchdog_ms=settings.watchdog_ms,
-        ),
-    )
-
-
-def _axis_range(cable: CableDrive) -> tuple[int, int]:
-    ends = round(1e3 * cable.sign * cable.min_mm), round(1e3 * cable.sign * cable.max_mm)
-    return min(ends), max(ends)
 
 
 def _motive_settings(rig: RigFile, settings: EmulationSettings) -> MotiveSettings:
