@@ -6,10 +6,12 @@ from typing import Final
 
 from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
 from tcr_hardware.emulators.plc_limits import PlcLimitSettings
+from tcr_hardware.errors import HardwareError
 from tcrctl.emulate.imperfections import Imperfections
 from tcrctl.emulate.line import EmulatedDrives
 from tcrctl.emulate.settings import EmulationSettings
 from tcrctl.emulate.winches import EmulatedWinches
+from tcrctl.errors import DeviceError
 from tcrctl.plant.rig.settings import CableDrive, Dynamixel, MountedRobot
 
 #: The PLC's limits are wider than the soft limits of the rig file by this [um].
@@ -25,10 +27,16 @@ def emulated_drives(
         mounted: Section of the rig file.
         settings: Of the emulation.
         real: What is imperfect about the robot.
+
+    Raises:
+        DeviceError: If this system has no pseudo-terminals, which motors need.
     """
     plc = mounted.plc
     if isinstance(plc, Dynamixel):
-        return EmulatedWinches(plc, tuple(cable.axis for cable in mounted.cables.values()))
+        try:
+            return EmulatedWinches(plc, tuple(cable.axis for cable in mounted.cables.values()))
+        except HardwareError as error:
+            raise DeviceError(f"Dynamixel motors cannot be emulated: {error}", hint=error.hint) from error
     return PlcEmulator(_plc_settings(plc.unit, mounted, settings, real))
 
 

@@ -10,12 +10,12 @@ import os
 import select
 import threading
 import time
-import tty
 from collections.abc import Callable, Iterator, Mapping
 from typing import Final
 
 from tcr_hardware.dynamixel.table import BUS_WATCHDOG, HARDWARE_ERROR, HardwareFault, Mode
 from tcr_hardware.emulators.dynamixel_motor import DynamixelMotor
+from tcr_hardware.emulators.modbus_rtu import pseudo_terminal
 
 HEADER: Final = b"\xff\xff\xfd\x00"
 PING, READ, WRITE, SYNC_READ, SYNC_WRITE, STATUS = 0x01, 0x02, 0x03, 0x82, 0x83, 0x55
@@ -48,11 +48,13 @@ class DynamixelEmulator:
             turns: Where the horn of every motor stands [counts].
             mode: Their operating mode.
             clock: Never jumps [s].
+
+        Raises:
+            HardwareError: There are no pseudo-terminals on this system.
         """
         self._clock, self._lock, self._end = clock, threading.RLock(), threading.Event()
         self.motors = {number: DynamixelMotor(turn, clock(), mode) for number, turn in turns.items()}
-        self._ours, self._theirs = os.openpty()
-        tty.setraw(self._theirs)
+        self._ours, self._theirs = pseudo_terminal()
         self.device, self.silent, self.corrupt = os.ttyname(self._theirs), False, 0
         self._waiting = b""
         self._thread = threading.Thread(target=self._serve, daemon=True)
