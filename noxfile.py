@@ -2,7 +2,8 @@
 
 nox -s lint types fast        # before every commit
 nox -s test -- -k replay      # what stands after -- goes to pytest
-nox -s docs bench             # draw the pictures again, print the tables of cost
+nox -s docs                   # build the documentation site with all its figures, in build/site
+nox -s pictures bench         # draw the pictures of the documents again, print the tables of cost
 nox -s pin                    # write constraints.txt anew
 """
 
@@ -50,14 +51,22 @@ def test(session: nox.Session) -> None:
 
 @nox.session
 def docs(session: nox.Session) -> None:
-    """Check the links of the documents and draw their pictures again."""
-    session.run("python", "-m", "pytest", "-n", "0", "tests/test_documents.py")
+    """Check the documents, and build the site; figures of experiments that have one in build/figures are kept."""
+    session.run(
+        "python", "-m", "pytest", "-n", "0", "tests/test_documents.py", "tests/test_shown_commands.py"
+    )
+    session.run("python", "docs/site/build.py", "build/site", "--figures", "build/figures")
+
+
+@nox.session
+def pictures(session: nox.Session) -> None:
+    """Draw the pictures of the documents again."""
     with tempfile.TemporaryDirectory() as folder:
         session.run("tcrctl", "run", "letter_t", "--out", folder)
         (log,) = Path(folder).rglob("log.mcap")
         session.run("python", "docs/draw_letter.py", str(log), "docs/letter_t.png")
-    session.run("python", "docs/draw_control.py")
-    session.run("python", "docs/draw_reports.py")
+    for name in ("robot", "control", "reports"):
+        session.run("python", f"docs/draw_{name}.py")
 
 
 @nox.session
