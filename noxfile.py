@@ -3,6 +3,7 @@
 nox -s lint types fast        # before every commit
 nox -s test -- -k replay      # what stands after -- goes to pytest
 nox -s docs                   # build the documentation site with all its figures, in build/site
+nox -s examples               # install the packages in examples/ and run their tests
 nox -s pictures bench         # draw the pictures of the documents again, print the tables of cost
 nox -s pin                    # write constraints.txt anew
 """
@@ -70,6 +71,15 @@ def pictures(session: nox.Session) -> None:
 
 
 @nox.session
+def examples(session: nox.Session) -> None:
+    """Install the example packages and run their tests."""
+    for pyproject in sorted(Path("examples").glob("*/pyproject.toml")):
+        session.run("python", "-m", "pip", "install", "-q", "-c", str(CONSTRAINTS), str(pyproject.parent))
+        with session.chdir(pyproject.parent):
+            session.run("python", "-m", "pytest", "-q")
+
+
+@nox.session
 def bench(session: nox.Session) -> None:
     """Print what a step of control, plant, log and cameras costs."""
     for name in BENCHMARKS:
@@ -79,7 +89,7 @@ def bench(session: nox.Session) -> None:
 @nox.session(venv_backend="venv")
 def pin(session: nox.Session) -> None:
     """Install everything in its newest version into a fresh environment, and write down what that was."""
-    session.install(".[dev]")
+    session.install(".[dev]", "./examples/tcrctl-mujoco")
     versions = session.run("python", "-m", "pip", "freeze", silent=True)
     heading = CONSTRAINTS.read_text().splitlines()[0]
     kept = [line for line in str(versions).splitlines() if re.match(r"[\w.-]+==", line)]

@@ -11,7 +11,8 @@ import yaml
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "hardware").rglob("*.md")])
+FOLDERS = ("docs", "examples", "hardware")
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(path for name in FOLDERS for path in (ROOT / name).rglob("*.md"))])
 #: Where the links of a page of the site start, which is not its folder in the tree.
 SITE = ROOT / "docs" / "site"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]

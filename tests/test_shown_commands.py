@@ -16,7 +16,8 @@ from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.errors import InputError
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "hardware").rglob("*.md")])
+FOLDERS = ("docs", "examples", "hardware")
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(path for name in FOLDERS for path in (ROOT / name).rglob("*.md"))])
 #: Exit codes that a page tells its reader to expect.
 EXPECTED = {"diff": 3}
 ALL = [
