@@ -13,6 +13,8 @@ import pytest
 from tcrctl.cli.app import VERBS
 from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.config import shipped
+from tcrctl.log.columns import COLUMNS
+from tcrctl.log.viewer_topics import TOPICS
 
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "docs" / "site"
@@ -62,6 +64,14 @@ def test_the_reference_of_a_file_has_every_key_with_what_it_means(name):
 def test_types_of_a_schema_are_told_in_words(schema, words):
     page = part("keys").page("x", "X", "c", {"properties": {"key": {**schema, "description": "it"}}})
     assert page.splitlines()[-1] == f"| `key` | {words} | as below | it |"
+
+
+def test_the_page_of_the_log_has_every_field_of_a_step():
+    rows = [line for line in part("fields").page().splitlines() if line.startswith("| `")]
+    cells = {cell.strip(" `*") for row in rows for cell in row.split("|")}
+    assert {column.path for column in COLUMNS.values()} <= cells
+    assert set(COLUMNS) | set(TOPICS) <= cells
+    assert "| `estimate.q`* |" in "\n".join(rows)
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ ROOT = SITE.parents[1]
 sys.path.insert(0, str(SITE))
 
 import commands  # noqa: E402
+import fields  # noqa: E402
 import gallery  # noqa: E402
 import keys  # noqa: E402
 
@@ -53,6 +54,7 @@ def stage(source: Path, figures: Path | None) -> None:
         shutil.copy(page, source)
     commands.write(source / "commands")
     keys.write(source / "files")
+    fields.write(source / "files" / "fields.md")
     gallery.write(source / "gallery", figures)
 
 

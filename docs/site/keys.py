@@ -112,14 +112,13 @@ class _Page:
     def _plain(self, node: Schema, place: str) -> str:
         kind = str(node.get("type", "anything"))
         if kind == "array" and "prefixItems" in node:
-            inner = ", ".join(self._type(item, place) for item in node["prefixItems"])
-            return f"list of {len(node['prefixItems'])}: {inner}"
+            several = ", ".join(self._type(item, place) for item in node["prefixItems"])
+            return f"list of {len(node['prefixItems'])}: {several}"
         if kind == "array":
             kind = f"list of {self._type(node.get('items', {}), f'{place}[]')}"
         elif kind == "object":
-            inner = node.get("additionalProperties") or next(
-                iter(node.get("patternProperties", {}).values()), None
-            )
+            patterns = iter(node.get("patternProperties", {}).values())
+            inner = node.get("additionalProperties") or next(patterns, None)
             kind = f"map to {self._type(inner, f'{place}.NAME')}" if isinstance(inner, dict) else "map"
         bounds = [text.format(node[key]) for key, text in _BOUNDS.items() if key in node]
         return ", ".join([{"string": "text", "boolean": "true or false"}.get(kind, kind), *bounds])
