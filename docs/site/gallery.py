@@ -39,7 +39,7 @@ def write(folder: Path, figures: Path | None) -> None:
 
 def page(name: str, data: dict[str, Any], pictures: list[Path]) -> str:
     """Return the page of an experiment."""
-    shown = "\n".join(f"![{picture.stem}]({picture.name})\n" for picture in pictures)
+    shown = "\n".join(f"![{picture.stem.partition('_')[2]}]({picture.name})\n" for picture in pictures)
     source = f" ({data['source']})" if data.get("source") else ""
     return (
         f"# {name}\n\n{data['description']}{source}.\n\n```sh\ntcrctl run {name}\n```\n\n{shown}\n"
@@ -69,7 +69,7 @@ def _draw(name: str, folder: Path) -> list[Path]:
         wanted = [figure for figure in ("task", "overview", "error") if figure in worth_drawing(histories)][
             :2
         ]
-        made = [folder / f"{name}.{figure}.png" for figure in wanted]
+        made = [folder / f"{name}.{i}_{figure}.png" for i, figure in enumerate(wanted)]
         for figure, picture in zip(wanted, made, strict=True):
             save(draw(figure, histories), picture)
     return made
