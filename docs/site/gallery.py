@@ -39,7 +39,7 @@ def write(folder: Path, figures: Path | None) -> None:
 
 def page(name: str, data: dict[str, Any], pictures: list[Path]) -> str:
     """Return the page of an experiment."""
-    shown = "\n".join(f"![{picture.stem.partition('_')[2]}]({picture.name})\n" for picture in pictures)
+    shown = "\n".join(f"![{picture.stem.rpartition('_')[2]}]({picture.name})\n" for picture in pictures)
     source = f" ({data['source']})" if data.get("source") else ""
     return (
         f"# {name}\n\n{data['description']}{source}.\n\n```sh\ntcrctl run {name}\n```\n\n{shown}\n"
