@@ -12,6 +12,12 @@ from tcrctl.extend import Array, Command, Measurement, PlantSection, Robot, Trut
 from tcrctl_mujoco.model import mujoco_model
 from tcrctl_mujoco.rigid import NODES, rigid_modules
 
+#: What MuJoCo counts when it finds numbers that are none.
+_UNSTABLE = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
 #: Steps in which a robot is given time to come to rest.
 _PATIENCE = 200_000
 
@@ -68,7 +74,11 @@ class MujocoPlant:
         return Measurement(self.time, rings.astype(np.float32), seen, self._drive.copy())
 
     def write(self, command: Command) -> Command:
-        """Move the drives at ``command.speed`` for one period, as far as their stroke goes."""
+        """Move the drives at ``command.speed`` for one period, as far as their stroke goes.
+
+        Raises:
+            RuntimeError: If the simulation became unstable; MuJoCo would begin again at rest, without a word.
+        """
         low, high = self._robot.stroke
         after = np.clip(self._drive + self._period * command.speed, low, high)
         speed = (after - self._drive) / self._period
@@ -76,6 +86,7 @@ class MujocoPlant:
             self._advance(
                 self._drive + speed * (self._period * i / self._steps), speed, self._robot.model.damping
             )
+        self._check()
         self._drive = after
         self.time += self._period
         return Command(speed, after.copy())
@@ -112,7 +123,7 @@ class MujocoPlant:
             slowest: Speed of the fastest freedom at which it counts as rest [m/s, rad/s].
 
         Raises:
-            RuntimeError: If it does not come to rest.
+            RuntimeError: If it does not come to rest, or becomes unstable.
         """
         start, ramp = self._drive.copy(), round(2.0 / self.model.opt.timestep)
         self._drive = np.array(drive, dtype=float)
@@ -120,8 +131,15 @@ class MujocoPlant:
             part = min(1.0, i / ramp)
             self._advance(start + part * (self._drive - start), np.zeros_like(start), rate)
             if i > ramp and np.abs(self.data.qvel).max() < slowest:
+                self._check()
                 return
         raise RuntimeError(f"not at rest after {_PATIENCE} steps")
+
+    def _check(self) -> None:
+        if any(self.data.warning[kind].number for kind in _UNSTABLE):
+            raise RuntimeError(
+                f"MuJoCo's simulation is unstable after {self.time:g} s; try a smaller step_ms"
+            )
 
     def _advance(self, drive: Array, speed: Array, rate: float) -> None:
         """Make one internal step with drives (m,) [m] that move [m/s] and mass-proportional damping [1/s]."""
