@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import Final
 
 import numpy as np
 
-from tcrctl.commissioning.finding import Finding
+from tcrctl.commissioning.finding import NOT_READY, Finding
+from tcrctl.commissioning.picture import judged_picture
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
 from tcrctl.plant.rig.devices import DriveStatus, Sighting
@@ -29,7 +30,6 @@ ELSEWHERE: Final = 0.1
 SIDE_ERROR: Final = 0.05
 #: Older servers do not tell when a frame was taken.
 OLDEST_WITH_CLOCK: Final = (3, 0)
-NOT_READY: Final = 4
 WRONG_FILE: Final = InputError.exit_code
 NO_DEVICE: Final = DeviceError.exit_code
 
@@ -42,13 +42,14 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
         robot: The robot that hangs there.
         period: Control period that shall be possible [s].
     """
+    seen: list[Sighting] = []
     try:
         cameras = connect_cameras(loaded, robot)
     except (DeviceError, InputError) as error:
         yield Finding("cameras", str(error), error.exit_code)
     else:
         try:
-            yield from _check_cameras(cameras, robot, loaded.rig.safety)
+            yield from _check_cameras(cameras, robot, loaded.rig.safety, seen)
         except DeviceError as error:
             yield Finding("cameras", str(error), error.exit_code)
         finally:
@@ -59,19 +60,24 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
         yield Finding("PLC", str(error), error.exit_code)
         return
     try:
-        yield from _check_drives(loaded, drives, period)
+        status = yield from _check_drives(loaded, drives, period)
+        if seen:
+            yield from judged_picture(robot, seen, status)
+        yield from readiness(status)
     except DeviceError as error:
         yield Finding("PLC", str(error), error.exit_code)
     finally:
         drives.close()
 
 
-def _check_cameras(cameras: NatNetCameras, robot: Robot, rules: SafetyRules) -> Iterator[Finding]:
+def _check_cameras(
+    cameras: NatNetCameras, robot: Robot, rules: SafetyRules, seen: list[Sighting]
+) -> Iterator[Finding]:
+    """Check the stream; frames are added to ``seen``."""
     server = cameras.client.server
     if server is not None:
         who = f"{server.application}, NatNet {cameras.client.version}"
         yield Finding("cameras", f"{who}, {cameras.rate:g} Hz")
-    seen: list[Sighting] = []
     end = time.monotonic() + WATCHED
     while time.monotonic() < end:
         sighting = cameras.next(0.1, fresh=True)
@@ -129,9 +135,14 @@ def _check_places(sighting: Sighting, robot: Robot) -> Iterator[Finding]:
     yield Finding("calibration", text, 0 if away < ELSEWHERE else WRONG_FILE)
 
 
-def _check_drives(loaded: LoadedRig, drives: ModbusDrives, period: float) -> Iterator[Finding]:
+def _check_drives(
+    loaded: LoadedRig, drives: ModbusDrives, period: float
+) -> Generator[Finding, None, DriveStatus]:
+    """Check the PLC and the line to it; return what the drives say."""
     info = drives.bus.info
     text = f"map version {info.map_version}, words {info.word_order}, watchdog {info.limits.watchdog_ms} ms"
+    told = loaded.mounted.plc.watchdog_ms
+    text += "" if told == info.limits.watchdog_ms else f"; plc.watchdog_ms of the rig file is {told:g} ms"
     yield Finding("PLC", text)
     try:
         share = drives.check(loaded.rig.safety, period)
@@ -147,7 +158,7 @@ def _check_drives(loaded: LoadedRig, drives: ModbusDrives, period: float) -> Ite
     yield Finding("round trip", f"p50 {p50:.2f} ms, p99 {p99:.2f} ms")
     positions = ", ".join(f"{1e-3 * um:.3f}" for um in status.position)
     yield Finding("drives", f"at {positions} mm")
-    yield from readiness(status)
+    return status
 
 
 def readiness(status: DriveStatus) -> Iterator[Finding]:
