@@ -72,16 +72,27 @@ class FrictionProbe:
 
 
 def swing(seen: Array, half: int) -> Array:
-    """Return the amplitudes (n,) of a wave of ``2 half`` samples in the last half of ``seen`` (4 half, n)."""
+    """Return the amplitudes (n,) of a wave of ``2 half`` samples in the last half of ``seen`` (4 half, n).
+
+    A wave of two samples has no other phase than theirs, and so twice the weight in the sum.
+    """
     bent = seen[2 * half :] - 2.0 * seen[half:-half] + seen[: -2 * half]
     turns = np.exp(-1j * np.pi * np.arange(2 * half) / half)
-    return np.asarray(np.abs(turns @ bent) / (4.0 * half))
+    return np.asarray(np.abs(turns @ bent) / (4.0 * half if half > 1 else 8.0))
 
 
 def triangle(half: int, count: int) -> Array:
-    """Return a triangle wave from 0 with amplitude 1 at the ends of ``count`` periods, the first one 0 (count,)."""
-    phase = np.arange(count) / half + 0.5
-    return np.asarray(1.0 - 2.0 * np.abs(phase % 2.0 - 1.0))
+    """Return the wave of a dither with amplitude 1 at the ends of ``count`` periods, from 0 on (count,).
+
+    A triangle that has its corners at ends of periods: half a wave of an odd number of them begins beside its
+    middle, and its first corner is reached early and cut off.
+    """
+    k = np.arange(count)
+    wave = 1.0 - 2.0 * np.abs((k / half + (half // 2) / half) % 2.0 - 1.0)
+    if half % 2:
+        first = k <= half // 2
+        wave[first] = np.minimum(2.0 * k[first] / half, 1.0)
+    return np.asarray(wave)
 
 
 def _pattern(robot: Robot) -> Array:

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tcrctl.controller.dither import Dither
+from tcrctl.controller.dither_settings import DitherSettings
 from tcrctl.controller.friction_probe import FrictionProbe, swing, triangle
 from tcrctl.experiment.prepare import build_parts, build_plant, prepare
 from tcrctl.experiment.spec import load_spec
@@ -50,6 +52,30 @@ def test_it_knows_nothing_before_two_waves_have_told(probe):
 def test_a_wave_that_is_too_small_and_an_end_that_is_not_seen_tell_nothing(probe, tcr700):
     assert told(probe, np.zeros((20, 3)), amplitude=1e-6) is None
     assert told(FrictionProbe(tcr700, HALF, PERIOD), np.full((20, 3), np.nan)) is None
+
+
+@pytest.mark.parametrize("half", [1, 2, 3, 4, 5, 10])
+def test_the_wave_that_is_reckoned_with_is_the_one_that_the_dither_makes(half, tcr700):
+    """Rates at which half a wave of 5 Hz is one period, an odd number of them, an even one."""
+    dither = Dither(DitherSettings(frequency_hz=5.0, least_mm=1.0), 0.1 / half, tcr700, 1.0)
+    made = np.cumsum(
+        [0.0 * dither.now.place, *(0.1 / half * dither.speed() for _ in range(6 * half))], axis=0
+    )
+    along = made @ np.sign(made[1]) / (np.abs(made[1]) > 0.0).sum()
+    np.testing.assert_allclose(along, 1e-3 * triangle(half, 6 * half + 1), atol=1e-12)
+
+
+@pytest.mark.parametrize("half", [1, 2, 3])
+@pytest.mark.filterwarnings("error")
+def test_a_robot_without_friction_is_known_at_every_rate(half, tcr700):
+    probe = FrictionProbe(tcr700, half, 0.1 / half)
+    assert 0.1 < probe.frictionless < 10.0
+
+
+@pytest.mark.parametrize(("half", "size"), [(1, 0.5), (2, 1.0), (3, 2.0)])
+def test_a_sampled_wave_has_the_size_of_its_samples(half, size):
+    wave = size * np.cos(np.pi * np.arange(4 * half) / half)
+    np.testing.assert_allclose(swing(wave[:, None], half), [size], rtol=1e-9)
 
 
 def test_the_swing_of_a_wave_is_its_amplitude():
