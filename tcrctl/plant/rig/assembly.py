@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tcrctl.errors import InputError
-from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.file import LoadedRig, period_misfits
 from tcrctl.plant.rig.health import Rules
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
@@ -100,7 +100,8 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operati
         InputError: If they are not what the rig file says, or the period is impossible.
     """
     rules = loaded.rig.safety
-    _check_period(rules, period)
+    for text in period_misfits(loaded, period):
+        raise InputError(f"controller.period_s {text}")
     cameras = connect_cameras(loaded, robot)
     try:
         drives = connect_drives(loaded, robot.cable_names)
@@ -121,12 +122,3 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operati
         arm_timeout=rules.arm_timeout_s,
     )
     return RigPlant(cameras, drives, limits, period, operation)
-
-
-def _check_period(rules: SafetyRules, period: float) -> None:
-    """Check that ticks come often enough to notice in time that the cameras have stopped."""
-    if 1e3 * period > rules.stale_stop_ms:
-        raise InputError(
-            f"controller.period_s {period:g} s is longer than safety.stale_stop_ms of the rig, "
-            f"{rules.stale_stop_ms:g} ms"
-        )
