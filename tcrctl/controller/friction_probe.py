@@ -29,6 +29,9 @@ MODES: Final = 12
 WRONG: Final = np.linspace(0.8, 1.2, 9)
 #: Amplitude of a wave of the drives that is too small to tell [m].
 FAINT: Final = 2e-5
+#: Periods of half a wave with which it tells something: with one the end seems to lag, and cables with a friction
+#: coefficient of 0.1 seem not to rub.
+SHORTEST: Final = 2
 #: Waves that have to tell the same.
 ENOUGH: Final = 2
 #: Steps of a period in which the model's answer is integrated.
@@ -72,13 +75,10 @@ class FrictionProbe:
 
 
 def swing(seen: Array, half: int) -> Array:
-    """Return the amplitudes (n,) of a wave of ``2 half`` samples in the last half of ``seen`` (4 half, n).
-
-    A wave of two samples has no other phase than theirs, and so twice the weight in the sum.
-    """
+    """Return the amplitudes (n,) of a wave of ``2 half`` samples in the last half of ``seen`` (4 half, n)."""
     bent = seen[2 * half :] - 2.0 * seen[half:-half] + seen[: -2 * half]
     turns = np.exp(-1j * np.pi * np.arange(2 * half) / half)
-    return np.asarray(np.abs(turns @ bent) / (4.0 * half if half > 1 else 8.0))
+    return np.asarray(np.abs(turns @ bent) / (4.0 * half))
 
 
 def triangle(half: int, count: int) -> Array:

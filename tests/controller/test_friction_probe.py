@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -65,17 +66,17 @@ def test_the_wave_that_is_reckoned_with_is_the_one_that_the_dither_makes(half, t
     np.testing.assert_allclose(along, 1e-3 * triangle(half, 6 * half + 1), atol=1e-12)
 
 
-@pytest.mark.parametrize("half", [1, 2, 3])
+@pytest.mark.parametrize(("period", "probed"), [(0.2, False), (0.1, False), (0.05, True), (0.03, True)])
 @pytest.mark.filterwarnings("error")
-def test_a_robot_without_friction_is_known_at_every_rate(half, tcr700):
-    probe = FrictionProbe(tcr700, half, 0.1 / half)
-    assert 0.1 < probe.frictionless < 10.0
-
-
-@pytest.mark.parametrize(("half", "size"), [(1, 0.5), (2, 1.0), (3, 2.0)])
-def test_a_sampled_wave_has_the_size_of_its_samples(half, size):
-    wave = size * np.cos(np.pi * np.arange(4 * half) / half)
-    np.testing.assert_allclose(swing(wave[:, None], half), [size], rtol=1e-9)
+def test_a_loop_that_is_too_slow_for_the_wave_says_that_it_does_not_know(period, probed, tcr700):
+    dither = Dither(DitherSettings(), period, tcr700, 0.05)
+    estimate = SimpleNamespace(position=np.zeros(3), drive=np.zeros(6))
+    for _ in range(40):
+        dither.observe(np.zeros(3), estimate, settling=True)
+        estimate.drive = estimate.drive + period * dither.speed()
+        estimate.position = 2.0 * np.array([estimate.drive[0], 0.0, 0.0])
+    assert (dither.thrown is not None) == probed
+    assert dither.slides <= probed
 
 
 def test_the_swing_of_a_wave_is_its_amplitude():
