@@ -259,6 +259,19 @@ def test_a_ring_that_is_seen_for_the_first_time_in_motion_is_believed_as_it_is()
     assert judged(drifted).names[0] == "ring 6"
 
 
+@pytest.mark.parametrize("millimetres", [-49.6, 20.0])
+def test_a_ring_beside_one_that_is_not_seen_goes_no_further_along_the_body_than_a_joint_gives(millimetres):
+    """As with the last two rings exchanged, once the last one is left out."""
+    seen = np.ones(3 * RINGS, np.bool_)
+    seen[rows_of(RINGS)] = False
+    made = [pictures.moved(m, m.nodes, seen) for m in frames(1, bias_mm=4.0)]
+    assert judged(made).first is None
+    far = [shifted(m, rows_of(10), (0, 0, millimetres if k >= BEGIN else 0)) for k, m in enumerate(made)]
+    found = judged(far)
+    assert found.first == BEGIN - STILL
+    assert all(out[rows_of(10)].all() for out in found.out[BEGIN - STILL :])
+
+
 def test_rings_without_neighbours_are_judged_by_their_sizes():
     some = np.zeros(3 * RINGS, np.bool_)
     some[rows_of(5) + rows_of(RINGS)] = True
