@@ -7,7 +7,7 @@ import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias, get_args
 
 Status: TypeAlias = Literal["success", "failed", "aborted", "error", "infeasible", "timeout", "crashed"]
 """As in ``run --json``; and: path or robot were refused, the time limit was passed, the process died."""
@@ -73,12 +73,23 @@ def unanswered(rows: Sequence[Row]) -> str:
 
 
 def loads(line: bytes) -> Row | None:
-    """Read a line; return None if it is not one that was written whole."""
+    """Read a line; return None if it is not one that was written whole, or holds values of other types."""
     try:
-        data = json.loads(line)
-        return Row(**data) if line.endswith(b"\n") else None
-    except (ValueError, TypeError):
+        row = Row(**json.loads(line))
+    except (ValueError, TypeError, RecursionError):
         return None
+    return row if line.endswith(b"\n") and _is_sound(row) else None
+
+
+def _is_sound(row: Row) -> bool:
+    texts = (row.address, row.reason, row.program, "" if row.log is None else row.log)
+    maps = (row.result, row.timing, row.path)
+    return (
+        row.status in get_args(Status)
+        and all(isinstance(text, str) for text in texts)
+        and all(isinstance(part, dict) for part in maps)
+        and isinstance(row.seconds, int | float)
+    )
 
 
 def same_every_time(result: Mapping[str, Any]) -> dict[str, Any]:
