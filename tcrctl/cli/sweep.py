@@ -190,8 +190,10 @@ def _print_plan(study: LoadedStudy, runs: list[PlannedRun], out: Path, jobs: int
     if as_json:
         print(json.dumps({"status": "success", "reason": "", "study": study.spec.name, **plan.as_json()}))
         return
-    for line in plan.lines():
-        print(line)
+    from tcrctl.cli.table import print_table
+
+    print_table(plan.titles, plan.rows())
+    print(plan.sentence)
 
 
 @contextmanager
