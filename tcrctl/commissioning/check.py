@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import Final
 
 import numpy as np
 
+from tcrctl.commissioning.picture import judged_picture
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
 from tcrctl.plant.rig.devices import Cameras, Drives, DriveStatus, Sighting
 from tcrctl.plant.rig.file import LoadedRig
-from tcrctl.plant.rig.finding import Finding
+from tcrctl.plant.rig.finding import NOT_READY, Finding
 from tcrctl.plant.rig.mounting import CableAxis, cable_axes, mounting
 from tcrctl.plant.rig.own_limits import UNWATCHED, check_limits, check_load
 from tcrctl.plant.rig.settings import SafetyRules
@@ -27,7 +28,6 @@ READS: Final = 100
 ELSEWHERE: Final = 0.1
 #: Sides of measured rings may differ so much from those of the robot; more means a wrong unit or label.
 SIDE_ERROR: Final = 0.05
-NOT_READY: Final = 4
 WRONG_FILE: Final = InputError.exit_code
 NO_DEVICE: Final = DeviceError.exit_code
 
@@ -41,13 +41,14 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
         period: Control period that shall be possible [s].
     """
     wanted = mounting(loaded.mounted, robot)
+    seen: list[Sighting] = []
     try:
         cameras = connect_cameras(loaded, wanted)
     except (DeviceError, InputError) as error:
         yield Finding("cameras", str(error), error.exit_code)
     else:
         try:
-            yield from _check_cameras(cameras, len(wanted.markers), robot, loaded.rig.safety)
+            yield from _check_cameras(cameras, len(wanted.markers), robot, loaded.rig.safety, seen)
         except DeviceError as error:
             yield Finding("cameras", str(error), error.exit_code)
         finally:
@@ -58,17 +59,23 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
         yield Finding(loaded.mounted.plc.called, str(error), error.exit_code)
         return
     try:
-        yield from _check_drives(drives, cable_axes(loaded.mounted, robot.cable_names), loaded, period)
+        axes = cable_axes(loaded.mounted, robot.cable_names)
+        status = yield from _check_drives(drives, axes, loaded, period)
+        if seen:
+            yield from judged_picture(robot, seen, status)
+        yield from readiness(status)
     except DeviceError as error:
         yield Finding(loaded.mounted.plc.called, str(error), error.exit_code)
     finally:
         drives.close()
 
 
-def _check_cameras(cameras: Cameras, mapped: int, robot: Robot, rules: SafetyRules) -> Iterator[Finding]:
+def _check_cameras(
+    cameras: Cameras, mapped: int, robot: Robot, rules: SafetyRules, seen: list[Sighting]
+) -> Iterator[Finding]:
+    """Check the stream; frames are added to ``seen``."""
     if cameras.identity.text:
         yield Finding("cameras", f"{cameras.identity.text}, {cameras.rate:g} Hz")
-    seen: list[Sighting] = []
     end = time.monotonic() + WATCHED
     while time.monotonic() < end:
         sighting = cameras.next(0.1, fresh=True)
@@ -125,7 +132,8 @@ def _check_places(sighting: Sighting, robot: Robot) -> Iterator[Finding]:
 
 def _check_drives(
     drives: Drives, cables: tuple[CableAxis, ...], loaded: LoadedRig, period: float
-) -> Iterator[Finding]:
+) -> Generator[Finding, None, DriveStatus]:
+    """Check the drives and the line to them; return what they say."""
     identity = drives.identity
     yield Finding(identity.name, identity.text)
     try:
@@ -146,7 +154,7 @@ def _check_drives(
     yield Finding("round trip", f"p50 {p50:.2f} ms, p99 {p99:.2f} ms")
     positions = ", ".join(f"{1e-3 * um:.3f}" for um in status.position)
     yield Finding("drives", f"at {positions} mm")
-    yield from readiness(status)
+    return status
 
 
 def readiness(status: DriveStatus) -> Iterator[Finding]:

@@ -299,10 +299,10 @@ class WatchedEmulators:
 
     def picture(self, plant: RigPlant):
         """Judge the picture as a run does before the drives are armed; returns who judges it in motion."""
-        settings = PictureSettings()
-        check_picture(settings, self.robot, plant)
+        settings, frames = PictureSettings(), first_frames(plant)
+        check_picture(settings, self.robot, frames)
         report = lambda *event: self.events.append(event)  # noqa: E731
-        return build_picture(settings, self.robot, PERIOD, first_frames(plant), report)
+        return build_picture(settings, self.robot, PERIOD, frames, report)
 
     def fail(self, case: Case):
         if isinstance(case.cameras, tuple):
@@ -331,7 +331,7 @@ class Loop:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             self.pace.wait(self.k * PERIOD)
-            self.picture.judged(self.plant.read())
+            self.picture.judged(self.plant.read(), self.pace.elapsed())
             if broken := self.picture.broken(self.k):
                 raise broken
             speed = 0.0 if self.picture.doubt else SPEED * (1 if self.k % 100 < 50 else -1)

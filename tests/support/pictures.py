@@ -128,12 +128,14 @@ class Judged:
         doubts: Why the drives were held, frame by frame.
         stopped: Index of the frame that would have stopped the run; None if none would.
         events: What was said.
+        told: In which frame each was said.
     """
 
     out: list = field(default_factory=list)
     doubts: list = field(default_factory=list)
     stopped: int | None = None
     events: list = field(default_factory=list)
+    told: list = field(default_factory=list)
 
     @property
     def first(self):
@@ -147,8 +149,8 @@ class Judged:
         return [name for name in told if not name.startswith("the drives are held")]
 
 
-def judged(measurements, **settings):
-    """Let a judge look at frames, of which the first STILL are those of the start."""
+def judged(measurements, elapsed=None, **settings):
+    """Let a judge look at frames, of which the first STILL are those of the start, at some times [s] or in time."""
     found = Judged()
     judge = PictureJudge(
         PictureSettings(**settings),
@@ -158,8 +160,9 @@ def judged(measurements, **settings):
         lambda *event: found.events.append(event),
     )
     for k, measured in enumerate(measurements[STILL:]):
-        left = judge.judged(measured)
+        left = judge.judged(measured, k * PERIOD if elapsed is None else elapsed[k])
         found.out.append(measured.valid & ~left.valid)
+        found.told += [k] * (len(found.events) - len(found.told))
         found.doubts.append(judge.doubt)
         if found.stopped is None and judge.broken(k) is not None:
             found.stopped = k

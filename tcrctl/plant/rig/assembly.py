@@ -6,7 +6,7 @@ import numpy as np
 
 from tcrctl.errors import InputError
 from tcrctl.plant.rig.devices import Cameras, Drives
-from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.file import LoadedRig, period_misfits
 from tcrctl.plant.rig.health import Rules
 from tcrctl.plant.rig.mounting import CableAxis, Mounting, cable_axes, mounting
 from tcrctl.plant.rig.operation import Operation
@@ -129,7 +129,8 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operati
         ArmingRefusedError: If the drives have no watchdog.
     """
     rules = loaded.rig.safety
-    _check_period(rules, period)
+    for text in period_misfits(loaded, period):
+        raise InputError(f"controller.period_s {text}")
     wanted, names = mounting(loaded.mounted, robot), robot.cable_names
     cameras = connect_cameras(loaded, wanted)
     try:
@@ -151,12 +152,3 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operati
         arm_timeout=rules.arm_timeout_s,
     )
     return RigPlant(cameras, drives, limits, period, operation)
-
-
-def _check_period(rules: SafetyRules, period: float) -> None:
-    """Check that ticks come often enough to notice in time that the cameras have stopped."""
-    if 1e3 * period > rules.stale_stop_ms:
-        raise InputError(
-            f"controller.period_s {period:g} s is longer than safety.stale_stop_ms of the rig, "
-            f"{rules.stale_stop_ms:g} ms"
-        )

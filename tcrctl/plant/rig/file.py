@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tcr_hardware.modbus.wire_time import WATCHDOG_PERIODS
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.strict_yaml import Document
@@ -98,6 +100,26 @@ def load_rig(name_or_path: str, robot: RobotDescription, folder: Path | None = N
         raise InputError(f"{path}: robot {robot.name} does not hang on rig {rig.name}; there hang: {there}")
     document.refuse(_misfits(rig.robots[robot.name], robot))
     return LoadedRig(rig, robot.name, path, given)
+
+
+def period_misfits(loaded: LoadedRig, period: float) -> Iterator[str]:
+    """Yield why a rig cannot be run with a control period [s], as far as its file tells.
+
+    Ticks must come often enough to notice in time that the cameras have stopped, and to feed the PLC's watchdog
+    even if some of them are late. What the PLC itself says is looked at when it is connected.
+    """
+    period_ms, stale = 1e3 * period, loaded.rig.safety.stale_stop_ms
+    watchdog = getattr(
+        loaded.mounted.plc, "watchdog_ms", math.inf
+    )  # drives of one's own tell it when connected
+    if period_ms > stale:
+        yield f"is {period:g} s, longer than safety.stale_stop_ms of {loaded.path}, {stale:g} ms"
+    if WATCHDOG_PERIODS * period_ms > watchdog:
+        longest = 1e-3 * watchdog / WATCHDOG_PERIODS
+        yield (
+            f"is {period:g} s; the watchdog of the PLC has to be at least {WATCHDOG_PERIODS} periods, and "
+            f"plc.watchdog_ms of {loaded.path} is {watchdog:g} ms: at most {longest:.3g} s"
+        )
 
 
 def _misfits(mounted: MountedRobot, robot: RobotDescription) -> Iterator[Finding]:

@@ -95,7 +95,7 @@ class ModbusDrives:
         self._axes = np.array([cable.axis - 1 for cable in cables])
         self._signs = np.array([cable.sign for cable in cables], dtype=np.int64)
         self._speed = math.ceil(max(cable.speed for cable in cables) / 100.0) * 100
-        self._asks = plc.prompt
+        self._asks, self._told_ms = plc.prompt, plc.watchdog_ms
         self.bus = PlcBus(bus_settings(plc))
         try:
             self._call(self.bus.open)
@@ -194,8 +194,13 @@ class ModbusDrives:
         self._mine = True
 
     def checks(self) -> tuple[Finding, ...]:
-        """Return nothing: what a PLC is was looked at when the connection was opened."""
-        return ()
+        """Say where the watchdog is another one than the rig file's; the rest was looked at on opening."""
+        watchdog = self.bus.info.limits.watchdog_ms
+        if watchdog == self._told_ms:
+            return ()
+        return (
+            Finding("watchdog", f"{watchdog} ms; plc.watchdog_ms of the rig file is {self._told_ms:g} ms"),
+        )
 
     def close(self) -> None:
         """End the connection."""

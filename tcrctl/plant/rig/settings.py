@@ -118,6 +118,12 @@ class _Plc(DriveSection):
 
     unit: int = Field(default=1, ge=0, le=247, description="Modbus unit (slave) number")
     timeout_ms: float = quantity("ms", "how long an answer is waited for", 60.0, gt=0, le=1000)
+    watchdog_ms: float = quantity(
+        "ms",
+        "silence after which the PLC stops by itself; a control period too long for it is refused",
+        200.0,
+        gt=0,
+    )
     retries: int = Field(
         default=1, ge=0, le=3, description="an exchange without an answer is repeated so often"
     )
