@@ -2,7 +2,9 @@
 
 nox -s lint types fast        # before every commit
 nox -s test -- -k replay      # what stands after -- goes to pytest
-nox -s docs bench             # draw the pictures again, print the tables of cost
+nox -s docs                   # build the documentation site with all its figures, in build/site
+nox -s examples               # install the packages in examples/ and run their tests
+nox -s pictures bench         # draw the pictures of the documents again, print the tables of cost
 nox -s pin                    # write constraints.txt anew
 """
 
@@ -50,14 +52,31 @@ def test(session: nox.Session) -> None:
 
 @nox.session
 def docs(session: nox.Session) -> None:
-    """Check the links of the documents and draw their pictures again."""
-    session.run("python", "-m", "pytest", "-n", "0", "tests/test_documents.py")
+    """Check the documents, and build the site; figures of experiments that have one in build/figures are kept."""
+    session.run(
+        "python", "-m", "pytest", "-n", "0", "tests/test_documents.py", "tests/test_shown_commands.py"
+    )
+    session.run("python", "docs/site/build.py", "build/site", "--figures", "build/figures")
+
+
+@nox.session
+def pictures(session: nox.Session) -> None:
+    """Draw the pictures of the documents again."""
     with tempfile.TemporaryDirectory() as folder:
         session.run("tcrctl", "run", "letter_t", "--out", folder)
         (log,) = Path(folder).rglob("log.mcap")
         session.run("python", "docs/draw_letter.py", str(log), "docs/letter_t.png")
-    session.run("python", "docs/draw_control.py")
-    session.run("python", "docs/draw_reports.py")
+    for name in ("robot", "control", "reports"):
+        session.run("python", f"docs/draw_{name}.py")
+
+
+@nox.session
+def examples(session: nox.Session) -> None:
+    """Install the example packages and run their tests."""
+    for pyproject in sorted(Path("examples").glob("*/pyproject.toml")):
+        session.run("python", "-m", "pip", "install", "-q", "-c", str(CONSTRAINTS), str(pyproject.parent))
+        with session.chdir(pyproject.parent):
+            session.run("python", "-m", "pytest", "-q")
 
 
 @nox.session
@@ -70,7 +89,7 @@ def bench(session: nox.Session) -> None:
 @nox.session(venv_backend="venv")
 def pin(session: nox.Session) -> None:
     """Install everything in its newest version into a fresh environment, and write down what that was."""
-    session.install(".[dev]")
+    session.install(".[dev]", "./examples/tcrctl-mujoco")
     versions = session.run("python", "-m", "pip", "freeze", silent=True)
     heading = CONSTRAINTS.read_text().splitlines()[0]
     kept = [line for line in str(versions).splitlines() if re.match(r"[\w.-]+==", line)]

@@ -20,7 +20,7 @@ name              meaning                                                     sh
 ``theta_x, _y``   end orientation angles of eq. (45), both 0 at rest          ()                rad
 ``period``        control period η                                            ()                s
 ``horizon``       prediction horizon of the controller                        ()                s
-``h``             internal step: time step of an integrator, at most a period ()                s
+``h``             internal step: time step of an integrator, up to a period   ()                s
 ``step``          control step: one round of the loop, one record of a log
 ``k``             index of the control step, 0 .. n-1
 ``n_free``        free coordinates: all of ``q`` but those of the fixed base

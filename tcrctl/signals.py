@@ -49,9 +49,10 @@ class RawFrame:
         number: Frame number of the camera system.
         session: Times that the camera system was restarted before.
         delay: Time from the middle of the exposure to the arrival here [s].
-        ids: Marker ids (n,) int32.
-        positions: Marker positions in the frame of the cameras (n, 3) float32 [m].
-        flags: Marker flags of the camera system (n,) int32.
+        ids: Numbers by which the camera system tells markers apart (n,) int32; empty if it has none.
+        positions: Marker positions in the frame of the cameras (n, 3) float32, in their unit of length.
+        flags: What it says of each marker, in bits of its own (n,) int32; empty if nothing.
+        names: Names of the markers, one a line; None if it has only numbers.
     """
 
     number: int
@@ -60,6 +61,7 @@ class RawFrame:
     ids: NDArray[np.int32]
     positions: NDArray[np.float32]
     flags: NDArray[np.int32]
+    names: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,10 @@ import yaml
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "hardware").rglob("*.md")])
+FOLDERS = ("docs", "examples", "hardware")
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(path for name in FOLDERS for path in (ROOT / name).rglob("*.md"))])
+#: Where the links of a page of the site start, which is not its folder in the tree.
+SITE = ROOT / "docs" / "site"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
@@ -29,7 +32,8 @@ def normal(name):
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_every_link_within_the_tree_leads_to_a_file(document):
     targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)", document.read_text())
-    missing = [t for t in targets if "://" not in t and not (document.parent / t).exists()]
+    folder = ROOT if document.parent == SITE else document.parent
+    missing = [t for t in targets if "://" not in t and not (folder / t).exists()]
     assert missing == []
 
 

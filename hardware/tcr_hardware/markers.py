@@ -145,7 +145,8 @@ class MarkerMap:
             [
                 UNKNOWN_ID if node.asset is None else node.asset << 16 | (node.member or 0)
                 for node in self.nodes
-            ]
+            ],
+            dtype=np.int64,
         )
         self._models: ModelDefinitions | None = None
         self.reset()
@@ -184,8 +185,8 @@ class MarkerMap:
                 frame.data, reference[self._unlabelled], width[self._unlabelled]
             )
             reasons[self._unlabelled] = np.where(np.isnan(found[self._unlabelled, 0]), "missing", "")
-        jumped = np.linalg.norm(found - reference, axis=1) > width  # False without a reference
-        reasons[_jumped(reasons == "", jumped)] = "jump"
+        far = np.linalg.norm(found - reference, axis=1) > width  # False without a reference
+        reasons[jumped(reasons == "", far)] = "jump"
         if frame.models is None:
             reasons[self._named] = "no names"
         if frame.doubt:
@@ -207,7 +208,7 @@ class MarkerMap:
         """Return the positions (n, 3) of labelled nodes in the rig frame; fills in why they cannot be used."""
         found = np.full((len(self.nodes), 3), np.nan)
         rows = {number: row for row, number in enumerate(data.markers["id"].tolist())}
-        at = np.array([rows.get(number, -1) for number in self._ids.tolist()])
+        at = np.array([rows.get(number, -1) for number in self._ids.tolist()], int)
         reasons[at < 0] = "missing"
         reasons[self._named & (self._ids == UNKNOWN_ID)] = "unknown label"
         listed = at >= 0
@@ -234,11 +235,16 @@ class MarkerMap:
         return found
 
 
-def _jumped(usable: NDArray[np.bool_], jumped: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which nodes have jumped: all of them if most have, for then it is the picture that has."""
-    jumped = jumped & usable
-    most = np.count_nonzero(jumped) > MOST * np.count_nonzero(usable)
-    return usable if most else jumped
+def jumped(usable: NDArray[np.bool_], far: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which nodes have jumped (n,): all of them if most have, for then it is the picture that has.
+
+    Args:
+        usable: Which nodes are seen (n,).
+        far: Which are further from where they were than their gate (n,).
+    """
+    away = far & usable
+    most = np.count_nonzero(away) > MOST * np.count_nonzero(usable)
+    return usable if most else away
 
 
 def _check_shared(nodes: Sequence[NodeMarker]) -> None:

@@ -81,7 +81,9 @@ def errors(columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
 
 def _is_wanted(column: Column, nodes: bool, ahead: bool) -> bool:
     """Tell whether a quantity has not so many numbers that a table is better off without."""
-    raw = column.path.startswith("measurement.raw.") and column.kind.endswith("[]")
+    raw = column.path.startswith("measurement.raw.") and (
+        column.kind.endswith("[]") or column.field == "names"
+    )
     if raw or column.field in PER_NODE:
         return nodes
     return ahead or not column.path.startswith("reference.ahead_")

@@ -43,7 +43,7 @@ def run(
         confirmed: You agree that a rig moves; without it a rig is not armed.
 
     Returns:
-        The run, also of one that was stopped or failed a criterion: ``summary["status"]`` says so.
+        The run, also one that was stopped or failed a criterion, as ``summary["status"]`` says.
 
     Raises:
         InputError: If the experiment has problems.

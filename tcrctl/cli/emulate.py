@@ -120,7 +120,7 @@ def _built(
 
 def _places(rig: str, bench: EmulatedBench) -> str:
     host, port = bench.motive.address
-    plcs = ", ".join(f"{name} {plc.address[0]}:{plc.address[1]}" for name, plc in bench.plcs.items())
+    plcs = ", ".join(f"{name} {place}" for name, place in bench.places.items())
     return f"rig {rig} is emulated: cameras {host}:{port}; PLC of {plcs}; Ctrl-C ends it"
 
 

@@ -18,6 +18,15 @@ if TYPE_CHECKING:
 Begin = Annotated[float | None, typer.Option("--from", metavar="SECONDS", help="First time played.")]
 
 
+def _print_layout(wanted: bool) -> None:
+    if not wanted:
+        return
+    from tcrctl.view.layout import layout
+
+    print(layout(), end="")
+    raise typer.Exit()
+
+
 @dataclass(frozen=True)
 class Playing:
     """What is played, and how."""
@@ -44,6 +53,15 @@ def play(
     port: Annotated[
         int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port; 0 takes a free one.")
     ] = 8765,
+    print_layout: Annotated[
+        bool,
+        typer.Option(
+            "--layout",
+            help="Print a layout of the app's panels for it to import, and exit.",
+            callback=_print_layout,
+            is_eager=True,
+        ),
+    ] = False,
 ) -> None:
     """Play a log to the Foxglove app; nothing but pictures moves. Needs the package's extra 'view'.
 
@@ -53,7 +71,9 @@ def play(
     Examples:
       tcrctl play logs/latest
       tcrctl play log.mcap --rate 5 --from 10 --loop
+      tcrctl play --layout > tcrctl.foxglove.json
     """
+    del print_layout
     from tcrctl.errors import RunInterruptedError
     from tcrctl.loop.interruption import Interruption
     from tcrctl.view.play import Playback

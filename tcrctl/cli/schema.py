@@ -30,13 +30,13 @@ def schema(
     from tcrctl.experiment.plugged import with_registered
     from tcrctl.experiment.spec import ExperimentSpec
     from tcrctl.identify.settings import IdentificationSpec
-    from tcrctl.plant.rig.settings import RigFile
+    from tcrctl.plant.rig import plugged
     from tcrctl.robot.description import RobotDescription
     from tcrctl.study.settings import StudySpec
 
     kinds: list[tuple[bool, type[Settings]]] = [
         (robot, RobotDescription),
-        (rig, RigFile),
+        (rig, plugged.with_registered()),
         (identification, IdentificationSpec),
         (study, StudySpec),
     ]

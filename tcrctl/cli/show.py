@@ -1,9 +1,11 @@
-"""``tcrctl show SPEC``: an experiment, identification, study or robot with every default filled in."""
+"""``tcrctl show SPEC``: an experiment, identification, study, robot or rig with every default filled in."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from tcrctl.cli.options import AsJson, IsRobot, Overrides, Spec
 
@@ -11,17 +13,24 @@ if TYPE_CHECKING:
     from tcrctl.config.settings import Settings
 
 
-def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_json: AsJson = False) -> None:
+def show(
+    spec: Spec,
+    overrides: Overrides = None,
+    robot: IsRobot = False,
+    rig: Annotated[bool, typer.Option("--rig", help="Rig files instead of experiments.")] = False,
+    as_json: AsJson = False,
+) -> None:
     """Print an experiment as it will run: defaults filled in, --set applied. A robot file keeps its comments.
 
     Examples:
       tcrctl show letter_t
       tcrctl show letter_t --set controller.tension=off --json
       tcrctl show --robot tcr700
+      tcrctl show --rig loopback
     """
     from tcrctl.config import strict_yaml
 
-    found = _found(spec, overrides or (), robot=robot)
+    found = _rig(spec, overrides, robot=robot) if rig else _found(spec, overrides or (), robot=robot)
     if as_json:
         print(found.model_dump_json())
     elif robot:
@@ -32,6 +41,15 @@ def show(spec: Spec, overrides: Overrides = None, robot: IsRobot = False, as_jso
         print(with_values(text, found.model_dump(mode="json")), end="")
     else:
         print(strict_yaml.dumps(found.model_dump(mode="json")), end="")
+
+
+def _rig(name: str, overrides: Sequence[str] | None, *, robot: bool) -> Settings:
+    from tcrctl.errors import InputError
+    from tcrctl.plant.rig.file import read_rig
+
+    if robot or overrides:
+        raise InputError("--rig goes with neither --robot nor --set")
+    return read_rig(name)[0]
 
 
 def _found(name: str, overrides: Sequence[str], *, robot: bool) -> Settings:

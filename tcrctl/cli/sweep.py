@@ -13,14 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
-from tcrctl.cli.table import print_table
 
 if TYPE_CHECKING:
     from tcrctl.study.loading import LoadedStudy
-    from tcrctl.study.outputs import Findings
     from tcrctl.study.plan import PlannedRun
     from tcrctl.study.row import Row
-    from tcrctl.study.sweep import Done
 
     Told = Callable[[PlannedRun, Row], None]
 
@@ -70,7 +67,7 @@ class Manner:
         typer.Option("--timeout", metavar="S", min=0.1, help="A run that takes longer is stopped."),
     ] = None
     logs: Annotated[str, typer.Option("--logs", help="Logs that are kept: all, failed or none.")] = "failed"
-    retry: Annotated[bool, typer.Option("--retry", help="Do again what timed out or crashed.")] = False
+    retry: Annotated[bool, typer.Option("--retry", help="Do again what has no result.")] = False
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where the study's folder is.")
     ] = Path("logs")
@@ -104,7 +101,8 @@ def sweep(
 
     Rows of the runs that are done are kept in DIR/NAME.study; started again, it does what is missing, whatever
     ended it. table.csv there has one row per run and is the same byte for byte whatever the engine. A run that
-    diverges, times out or crashes is a row with its reason.
+    diverges, times out or crashes is a row with its reason. Exit code 3: a run has no result, because it crashed,
+    timed out or ended in an error; a missed criterion, a limit and a refused path are results.
 
     Examples:
       tcrctl sweep letter_t --seeds 0..9 --set plant.mismatch.springs_youngs_modulus=0.6,0.8,1
@@ -134,7 +132,12 @@ def sweep(
             retry=manner.retry,
             told=told,
         )
-    _finish(study, result, manner.out, shown, as_json=as_json)
+    from tcrctl.cli.sweep_result import Shape, show, write
+
+    found = write(study, result, manner.out, parquet=shown.parquet, figures=shown.figures)
+    show(study, result, found, manner.out, Shape(shown.form, as_json, shown.quiet))
+    if result.exit_code:
+        raise typer.Exit(result.exit_code)
 
 
 def _check(manner: Manner, shown: Shown) -> None:
@@ -187,61 +190,10 @@ def _print_plan(study: LoadedStudy, runs: list[PlannedRun], out: Path, jobs: int
     if as_json:
         print(json.dumps({"status": "success", "reason": "", "study": study.spec.name, **plan.as_json()}))
         return
-    for line in plan.lines():
-        print(line)
+    from tcrctl.cli.table import print_table
 
-
-def _finish(study: LoadedStudy, result: Done, out: Path, shown: Shown, *, as_json: bool) -> None:
-    from tcrctl.report.study import write_study_page
-    from tcrctl.study.outputs import findings, write
-    from tcrctl.study.sweep import folder_of
-
-    folder, found = folder_of(study, out), findings(study.spec, result)
-    write(found, folder, parquet=shown.parquet)
-    write_study_page(found, result, folder)
-    if shown.figures is not None:
-        from tcrctl.plots.study import save_study_figures
-        from tcrctl.study.groups import done
-
-        save_study_figures(study.spec, done(result.runs, result.rows), folder / "figures", shown.figures)
-    reason = "" if result.interruption is None else str(result.interruption)
-    if reason:
-        print(f"error: {reason}; {result.missing} runs are missing: start again to go on", file=sys.stderr)
-    if as_json:
-        print(json.dumps(_as_json(study, result, found, folder, reason)))
-    elif shown.quiet and shown.form == "text":
-        pass
-    elif shown.form != "text":
-        print(found.text(shown.form), end="")  # type: ignore[arg-type]  # checked above
-    else:
-        _print_tables(found)
-        print(
-            f"{len(result.runs) - result.missing} of {len(result.runs)} runs, {result.new} of them now: {folder}"
-        )
-    if result.exit_code:
-        raise typer.Exit(result.exit_code)
-
-
-def _as_json(study: LoadedStudy, result: Done, found: Findings, folder: Path, reason: str) -> dict[str, Any]:
-    from tcrctl.study.outputs import TABLE
-
-    return {
-        "status": "success" if result.interruption is None else "aborted",
-        "reason": reason,
-        "study": study.spec.name,
-        "runs": len(result.runs),
-        "new": result.new,
-        "missing": result.missing,
-        "seconds": result.seconds,
-        "folder": str(folder),
-        "table": str(folder / TABLE),
-        **found.as_json(),
-    }
-
-
-def _print_tables(found: Findings) -> None:
-    for text in found.tables(brief=True):
-        print_table(text.head, text.rows)
+    print_table(plan.titles, plan.rows())
+    print(plan.sentence)
 
 
 @contextmanager

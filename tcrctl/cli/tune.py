@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from tcrctl.study.loading import LoadedStudy
     from tcrctl.tune.tuning import Tuned
 
+#: What is said if nothing better was found.
+STAND = "the shipped settings stand"
+
 
 @dataclass(frozen=True)
 class How:
@@ -49,6 +52,7 @@ def tune(
 
     What is found is judged on plants that were not tuned on. If it is better there, experiment files
     NAME_tuned.yaml are written into the study's folder; if not, the shipped settings stand and nothing is written.
+    Exit code 3: a run that is compared crashed, timed out or ended in an error.
     Every run is kept: started again, the search goes on where it was ended. Needs the extra tune.
 
     Examples:
@@ -59,6 +63,7 @@ def tune(
 
     with signals_exit():
         from tcrctl.study.loading import load_study
+        from tcrctl.study.row import WITHOUT_RESULT
         from tcrctl.tune.tuning import Search
         from tcrctl.tune.tuning import tune as search
 
@@ -80,6 +85,9 @@ def tune(
         print(json.dumps(_as_json(study, found, files)))
     elif not quiet:
         _print(found, files)
+    if found.unanswered:
+        print(f"error: {found.unanswered}; started again, tune tries them again", file=sys.stderr)
+        raise typer.Exit(WITHOUT_RESULT)
 
 
 def _held_out(study: LoadedStudy, text: str | None) -> tuple[int, ...]:
@@ -112,8 +120,8 @@ def _write(study: LoadedStudy, found: Tuned, out: Path) -> list[Path]:
 
 def _as_json(study: LoadedStudy, found: Tuned, files: list[Path]) -> dict[str, Any]:
     return {
-        "status": "success",
-        "reason": "" if found.better else "the shipped settings stand",
+        "status": "failed" if found.unanswered else "success",
+        "reason": found.unanswered or ("" if found.better else STAND),
         "study": study.spec.name,
         "better": found.better,
         "settings": dict(found.settings),
@@ -138,8 +146,7 @@ def _print(found: Tuned, files: list[Path]) -> None:
     pairs = differences(found.judging, found.runs)
     if pairs:
         print(difference_table(pairs, "case", "shipped").markdown())
-    print(
-        "\n".join(map(str, files))
-        if files
-        else "the shipped settings stand: nothing better on plants not seen"
-    )
+    if files:
+        print("\n".join(map(str, files)))
+    elif not found.unanswered:
+        print(f"{STAND}: nothing better on plants not seen")

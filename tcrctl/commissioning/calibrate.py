@@ -10,18 +10,16 @@ import numpy as np
 
 from tcr_hardware.calibration import CalibrationResult, average, calibrate
 from tcr_hardware.errors import HardwareError
-from tcr_hardware.markers import Gate, MarkerMap, NodeMarker
-from tcr_hardware.natnet.client import NatNetClient
 from tcrctl.config import strict_yaml
 from tcrctl.config.yaml_core import compose
 from tcrctl.errors import DeviceError, InputError
+from tcrctl.plant.rig.assembly import connect_cameras
+from tcrctl.plant.rig.devices import Cameras
 from tcrctl.plant.rig.file import LoadedRig
-from tcrctl.plant.rig.natnet_cameras import connect, device_errors
-from tcrctl.plant.rig.settings import RigFile
+from tcrctl.plant.rig.mounting import BASE_NODES, base_mounting
+from tcrctl.plant.rig.settings import MarkerSettings, RigFile
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array
-
-BASE = ("base.n1", "base.n2", "base.n3")
 
 
 def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool) -> CalibrationResult:
@@ -37,19 +35,17 @@ def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool
         DeviceError: If the cameras do not answer or do not see the ring.
         InputError: If what they see does not fit the robot.
     """
-    markers, cameras = loaded.mounted.markers, loaded.rig.cameras
-    nodes = [NodeMarker(node, label=markers.base.format(node=i)) for i, node in enumerate(BASE, start=1)]
-    client = connect(cameras)
+    cameras = connect_cameras(loaded, base_mounting(loaded.mounted.markers))
     try:
-        measured = _measured(client, nodes, seconds)
+        measured = _measured(cameras, loaded.mounted.markers, seconds)
     finally:
-        client.close()
-    known = robot.rest.q.reshape(-1, 3)[: len(BASE)]
+        cameras.close()
+    known = robot.rest.q.reshape(-1, 3)[: len(BASE_NODES)]
     try:
         return calibrate(
             measured,
             known,
-            up_axis=cameras.up_axis,
+            up_axis=loaded.rig.cameras.up_axis,
             scale_m=loaded.mounted.calibration.scale_m,
             level=not free,
         )
@@ -57,27 +53,23 @@ def calibrate_rig(loaded: LoadedRig, robot: Robot, *, seconds: float, free: bool
         raise InputError(str(error), hint=error.hint) from error
 
 
-def _measured(client: NatNetClient, nodes: list[NodeMarker], seconds: float) -> Array:
-    """Return the mean marker positions in the cameras' frame (n, 3)."""
-    found = MarkerMap(nodes, np.zeros((len(nodes), 3)), gate=Gate(np.inf, np.inf, np.inf))
+def _measured(cameras: Cameras, markers: MarkerSettings, seconds: float) -> Array:
+    """Return the mean positions of the base ring's markers in the cameras' frame (3, 3)."""
     positions = []
     valid = []
-    frame = None
     end = time.monotonic() + seconds
-    with device_errors("cameras"):
-        found.resolve(client.wait_models())
-        while (left := end - time.monotonic()) > 0.0:
-            frame = client.wait_next(frame, left)
-            if frame is None:
-                break
-            located = found.locate(frame)
-            positions.append(located.positions.astype(float))
-            valid.append(located.valid)
+    while (left := end - time.monotonic()) > 0.0:
+        seen = cameras.next(left, fresh=True)
+        if seen is None:
+            break
+        positions.append(seen.nodes.astype(float))
+        valid.append(seen.valid)
     if not positions:
         raise DeviceError("the cameras send no frames")
     mean = average(np.array(positions), np.array(valid))
     if not mean.seen.all():
-        unseen = ", ".join(str(n.label) for n, seen in zip(nodes, mean.seen, strict=True) if not seen)
+        labels = [markers.base.format(node=node) for node in (1, 2, 3)]
+        unseen = ", ".join(label for label, seen in zip(labels, mean.seen, strict=True) if not seen)
         raise DeviceError(f"markers never seen: {unseen}")
     return mean.mean
 
@@ -93,13 +85,14 @@ def calibration_text(found: CalibrationResult) -> str:
     return "{" + ", ".join(f"{key}: {value}" for key, value in rounded.items()) + "}"
 
 
-def with_calibration(text: str, robot: str, section: str) -> str:
+def with_calibration(text: str, robot: str, section: str, model: type[RigFile] = RigFile) -> str:
     """Return a rig file with the calibration of one robot replaced, everything else kept as it is.
 
     Args:
         text: The file.
         robot: Name of the robot in it.
         section: What :func:`calibration_text` made.
+        model: Of the rig file, with the kinds that it names.
 
     Raises:
         InputError: If the place cannot be found.
@@ -124,7 +117,7 @@ def with_calibration(text: str, robot: str, section: str) -> str:
     else:
         end = old.end_mark
         made = text[: old.start_mark.index] + section + "\n" + text[end.index - end.column :]
-    strict_yaml.validate(strict_yaml.loads(made, "calibrated rig file"), RigFile)
+    strict_yaml.validate(strict_yaml.loads(made, "calibrated rig file"), model)
     return made
 
 
@@ -143,7 +136,7 @@ def write_calibrated(loaded: LoadedRig, section: str, out: Path | None) -> Path:
         DeviceError: If it cannot be written.
     """
     target = out or loaded.path
-    made = with_calibration(loaded.given.decode("utf-8-sig"), loaded.robot, section)
+    made = with_calibration(loaded.given.decode("utf-8-sig"), loaded.robot, section, type(loaded.rig))
     try:
         target.write_text(made, encoding="utf-8")
     except OSError as error:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import Final
 
 import numpy as np
 
-from tcrctl.commissioning.finding import Finding
+from tcrctl.commissioning.picture import judged_picture
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
-from tcrctl.plant.rig.devices import DriveStatus, Sighting
+from tcrctl.plant.rig.devices import Cameras, Drives, DriveStatus, Sighting
 from tcrctl.plant.rig.file import LoadedRig
-from tcrctl.plant.rig.modbus_drives import ModbusDrives
-from tcrctl.plant.rig.natnet_cameras import NatNetCameras
+from tcrctl.plant.rig.finding import NOT_READY, Finding
+from tcrctl.plant.rig.mounting import CableAxis, cable_axes, mounting
+from tcrctl.plant.rig.own_limits import UNWATCHED, check_limits, check_load
 from tcrctl.plant.rig.settings import SafetyRules
 from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot
@@ -27,9 +28,6 @@ READS: Final = 100
 ELSEWHERE: Final = 0.1
 #: Sides of measured rings may differ so much from those of the robot; more means a wrong unit or label.
 SIDE_ERROR: Final = 0.05
-#: Older servers do not tell when a frame was taken.
-OLDEST_WITH_CLOCK: Final = (3, 0)
-NOT_READY: Final = 4
 WRONG_FILE: Final = InputError.exit_code
 NO_DEVICE: Final = DeviceError.exit_code
 
@@ -42,13 +40,15 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
         robot: The robot that hangs there.
         period: Control period that shall be possible [s].
     """
+    wanted = mounting(loaded.mounted, robot)
+    seen: list[Sighting] = []
     try:
-        cameras = connect_cameras(loaded, robot)
+        cameras = connect_cameras(loaded, wanted)
     except (DeviceError, InputError) as error:
         yield Finding("cameras", str(error), error.exit_code)
     else:
         try:
-            yield from _check_cameras(cameras, robot, loaded.rig.safety)
+            yield from _check_cameras(cameras, len(wanted.markers), robot, loaded.rig.safety, seen)
         except DeviceError as error:
             yield Finding("cameras", str(error), error.exit_code)
         finally:
@@ -56,22 +56,26 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
     try:
         drives = connect_drives(loaded, robot.cable_names)
     except (DeviceError, InputError) as error:
-        yield Finding("PLC", str(error), error.exit_code)
+        yield Finding(loaded.mounted.plc.called, str(error), error.exit_code)
         return
     try:
-        yield from _check_drives(loaded, drives, period)
+        axes = cable_axes(loaded.mounted, robot.cable_names)
+        status = yield from _check_drives(drives, axes, loaded, period)
+        if seen:
+            yield from judged_picture(robot, seen, status)
+        yield from readiness(status)
     except DeviceError as error:
-        yield Finding("PLC", str(error), error.exit_code)
+        yield Finding(loaded.mounted.plc.called, str(error), error.exit_code)
     finally:
         drives.close()
 
 
-def _check_cameras(cameras: NatNetCameras, robot: Robot, rules: SafetyRules) -> Iterator[Finding]:
-    server = cameras.client.server
-    if server is not None:
-        who = f"{server.application}, NatNet {cameras.client.version}"
-        yield Finding("cameras", f"{who}, {cameras.rate:g} Hz")
-    seen: list[Sighting] = []
+def _check_cameras(
+    cameras: Cameras, mapped: int, robot: Robot, rules: SafetyRules, seen: list[Sighting]
+) -> Iterator[Finding]:
+    """Check the stream; frames are added to ``seen``."""
+    if cameras.identity.text:
+        yield Finding("cameras", f"{cameras.identity.text}, {cameras.rate:g} Hz")
     end = time.monotonic() + WATCHED
     while time.monotonic() < end:
         sighting = cameras.next(0.1, fresh=True)
@@ -80,27 +84,24 @@ def _check_cameras(cameras: NatNetCameras, robot: Robot, rules: SafetyRules) -> 
     if not seen:
         yield Finding("frames", f"none within {WATCHED:g} s", NO_DEVICE)
         return
-    counts = cameras.client.statistics()
+    counts = cameras.status()
     text = f"{len(seen)} in {WATCHED:g} s, {counts.lost} lost, {counts.malformed} malformed"
     yield Finding("frames", text, 0 if len(seen) > 0.5 * cameras.rate * WATCHED else NOT_READY)
     yield _age(cameras, 1e3 * float(np.median([sighting.raw.delay for sighting in seen])), rules)
-    if counts.strangers:
-        text = f"frames of a second source: {counts.strangers}; {counts.last_problem}"
-        yield Finding("source", text, NOT_READY)
+    yield from cameras.checks(seen)
     valid = np.mean([sighting.valid for sighting in seen], axis=0)
     always = int(np.count_nonzero(valid == 1.0))
     doubts = f"; last frame: {seen[-1].doubts}" if seen[-1].doubts else ""
-    text = f"{always} of {cameras.mapped} in every frame{doubts}"
-    yield Finding("markers", text, 0 if always == cameras.mapped else NOT_READY)
+    text = f"{always} of {mapped} in every frame{doubts}"
+    yield Finding("markers", text, 0 if always == mapped else NOT_READY)
     yield from _check_places(seen[-1], robot)
 
 
-def _age(cameras: NatNetCameras, delay: float, rules: SafetyRules) -> Finding:
+def _age(cameras: Cameras, delay: float, rules: SafetyRules) -> Finding:
     """Judge how old frames are when they arrive; ``delay`` is the median [ms]."""
-    client = cameras.client
-    if client.version is not None and client.version < OLDEST_WITH_CLOCK:
-        return Finding("age", f"not told by NatNet {client.version}; counted from the arrival")
-    impossible = client.statistics().impossible
+    if cameras.clock:
+        return Finding("age", f"{cameras.clock}; counted from the arrival")
+    impossible = cameras.status().impossible
     text = f"{delay:.1f} ms on arrival"
     if impossible:
         return Finding("age", f"{impossible} frames with impossible time stamps; otherwise {text}", NOT_READY)
@@ -129,16 +130,22 @@ def _check_places(sighting: Sighting, robot: Robot) -> Iterator[Finding]:
     yield Finding("calibration", text, 0 if away < ELSEWHERE else WRONG_FILE)
 
 
-def _check_drives(loaded: LoadedRig, drives: ModbusDrives, period: float) -> Iterator[Finding]:
-    info = drives.bus.info
-    text = f"map version {info.map_version}, words {info.word_order}, watchdog {info.limits.watchdog_ms} ms"
-    yield Finding("PLC", text)
+def _check_drives(
+    drives: Drives, cables: tuple[CableAxis, ...], loaded: LoadedRig, period: float
+) -> Generator[Finding, None, DriveStatus]:
+    """Check the drives and the line to them; return what they say."""
+    identity = drives.identity
+    yield Finding(identity.name, identity.text)
     try:
-        share = drives.check(loaded.rig.safety, period)
-        yield Finding("limits", "the rig file's are inside the PLC's")
+        check_limits(drives, cables, loaded.rig.safety)
+        yield Finding("limits", f"the rig file's are inside the {identity.name}'s")
+        share = check_load(drives, period)
         yield Finding("period", f"{1e3 * period:g} ms; the line is busy {100 * share:.0f} % of it")
     except InputError as error:
         yield Finding("limits", str(error), error.exit_code)
+    if drives.watchdog is None:
+        yield Finding("watchdog", UNWATCHED, NOT_READY)
+    yield from drives.checks()
     trips = []
     for _ in range(READS):
         status = drives.status()
@@ -147,7 +154,7 @@ def _check_drives(loaded: LoadedRig, drives: ModbusDrives, period: float) -> Ite
     yield Finding("round trip", f"p50 {p50:.2f} ms, p99 {p99:.2f} ms")
     positions = ", ".join(f"{1e-3 * um:.3f}" for um in status.position)
     yield Finding("drives", f"at {positions} mm")
-    yield from readiness(status)
+    return status
 
 
 def readiness(status: DriveStatus) -> Iterator[Finding]:

@@ -15,7 +15,9 @@ from tcrctl.loop.loop import step_count
 from tcrctl.loop.pacing import RealTime
 from tcrctl.plant.rig.assembly import connect_drives, envelope, supervisor_rules
 from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.mounting import cable_axes
 from tcrctl.plant.rig.operation import Operation
+from tcrctl.plant.rig.own_limits import check_drives
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
 from tcrctl.signals import Array, Command
 
@@ -82,7 +84,7 @@ def jog_rig(
     pace = RealTime(PERIOD, check)
     plant = RigPlant(WithoutCameras(), drives, limits, PERIOD, operation)
     try:
-        drives.check(rules, PERIOD)
+        check_drives(drives, cable_axes(loaded.mounted, names), rules, PERIOD)
         plant.look()
         start = 1e-6 * plant.position().astype(float)
         distance = jog.distances(names, start)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.plant.rig.assembly import connect_drives
+from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
 from tcrctl.plant.rig.devices import DriveStatus
 from tcrctl.plant.rig.file import LoadedRig
-from tcrctl.plant.rig.natnet_cameras import connect
+from tcrctl.plant.rig.mounting import NO_MARKERS
 
 FIRST_FRAME_S = 0.5
 
@@ -65,7 +65,7 @@ def rig_status(loaded: LoadedRig, names: tuple[str, ...]) -> RigStatus:
         loaded: The rig file.
         names: Cables in the order of the drives.
     """
-    cameras, camera_error = _cameras(loaded)
+    cameras, camera_error, code = _cameras(loaded)
     try:
         drives = connect_drives(loaded, names)
     except (DeviceError, InputError) as error:
@@ -77,22 +77,24 @@ def rig_status(loaded: LoadedRig, names: tuple[str, ...]) -> RigStatus:
     finally:
         drives.close()
     positions = {name: int(um) / 1e3 for name, um in zip(names, status.position, strict=True)}
-    code = DeviceError.exit_code if camera_error else 0
     return RigStatus(loaded.robot, status, positions, cameras, camera_error, code)
 
 
-def _cameras(loaded: LoadedRig) -> tuple[dict[str, Any], str]:
+def _cameras(loaded: LoadedRig) -> tuple[dict[str, Any], str, int]:
+    """Return what the cameras say, what went wrong, and its exit code."""
     try:
-        client = connect(loaded.rig.cameras)
+        cameras = connect_cameras(loaded, NO_MARKERS)
+    except (DeviceError, InputError) as error:
+        return {}, str(error), error.exit_code
+    try:
+        seen = cameras.next(FIRST_FRAME_S, fresh=False)
+        told = {
+            **cameras.identity.details,
+            "frame": None if seen is None else seen.raw.number,
+            "markers": None if seen is None else cameras.status().markers,
+        }
     except DeviceError as error:
-        return {}, str(error)
-    try:
-        frame, server = client.wait_next(None, FIRST_FRAME_S), client.server
-        return {
-            "server": "" if server is None else server.application,
-            "natnet": str(client.version),
-            "frame": None if frame is None else frame.number,
-            "markers": None if frame is None else len(frame.data.markers),
-        }, "" if frame is not None else "the cameras send no frames"
+        return {}, str(error), error.exit_code
     finally:
-        client.close()
+        cameras.close()
+    return (told, "", 0) if seen else (told, "the cameras send no frames", DeviceError.exit_code)

@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tcrctl.controller.dither_settings import DitherSettings
-from tcrctl.controller.friction_probe import FrictionProbe
+from tcrctl.controller.friction_probe import SHORTEST, FrictionProbe
 from tcrctl.memory import POSITION, Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.robot.swing import signs
@@ -75,7 +75,8 @@ class Dither:
         self._least = min(self._settings.least_mm / 1e3, self._most)
         self._sizes = np.array([self._least if self.runs else 0.0, 0.0])
         self._probe: FrictionProbe | None = None
-        if self.runs and 0.0 < self._settings.probe_mm > self._settings.least_mm:
+        told = self._half_wave >= SHORTEST and self._settings.probe_mm > 0.0
+        if self.runs and told and self._settings.probe_mm > self._settings.least_mm:
             self._probe = FrictionProbe(robot, self._half_wave, period)
         self._probes = False
         self._wave, self._place = 0.0, np.zeros(robot.n_cables)

@@ -29,6 +29,9 @@ MODES: Final = 12
 WRONG: Final = np.linspace(0.8, 1.2, 9)
 #: Amplitude of a wave of the drives that is too small to tell [m].
 FAINT: Final = 2e-5
+#: Periods of half a wave with which it tells something: with one the end seems to lag, and cables with a friction
+#: coefficient of 0.1 seem not to rub.
+SHORTEST: Final = 2
 #: Waves that have to tell the same.
 ENOUGH: Final = 2
 #: Steps of a period in which the model's answer is integrated.
@@ -79,9 +82,17 @@ def swing(seen: Array, half: int) -> Array:
 
 
 def triangle(half: int, count: int) -> Array:
-    """Return a triangle wave from 0 with amplitude 1 at the ends of ``count`` periods, the first one 0 (count,)."""
-    phase = np.arange(count) / half + 0.5
-    return np.asarray(1.0 - 2.0 * np.abs(phase % 2.0 - 1.0))
+    """Return the wave of a dither with amplitude 1 at the ends of ``count`` periods, from 0 on (count,).
+
+    A triangle that has its corners at ends of periods: half a wave of an odd number of them begins beside its
+    middle, and its first corner is reached early and cut off.
+    """
+    k = np.arange(count)
+    wave = 1.0 - 2.0 * np.abs((k / half + (half // 2) / half) % 2.0 - 1.0)
+    if half % 2:
+        first = k <= half // 2
+        wave[first] = np.minimum(2.0 * k[first] / half, 1.0)
+    return np.asarray(wave)
 
 
 def _pattern(robot: Robot) -> Array:

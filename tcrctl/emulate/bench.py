@@ -21,23 +21,23 @@ import numpy as np
 
 from tcr_hardware.emulators.motive import MotiveEmulator
 from tcr_hardware.emulators.motive_settings import MotiveSettings
-from tcr_hardware.emulators.plc import PlcEmulator, PlcSettings
-from tcr_hardware.emulators.plc_limits import PlcLimitSettings
+from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.errors import HardwareError
 from tcr_hardware.rigid_transform import RigidTransform
+from tcrctl.emulate.drives import emulated_drives
 from tcrctl.emulate.fault_script import FaultPlayer, FaultScript
 from tcrctl.emulate.imperfections import Imperfections
+from tcrctl.emulate.line import EmulatedDrives, open_line
 from tcrctl.emulate.robot import EmulatedRobot
 from tcrctl.emulate.settings import EmulationSettings
 from tcrctl.errors import DeviceError, InputError
-from tcrctl.plant.rig.natnet_cameras import transform
-from tcrctl.plant.rig.settings import CableDrive, ModbusTcp, MountedRobot, RigFile
+from tcrctl.plant.rig.mounting import transform
+from tcrctl.plant.rig.settings import MountedRobot, RigFile
+from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.robot import Robot, build_robot
 from tcrctl.signals import Array
 
-#: The PLC's limits are wider than the soft limits of the rig file by this [um].
-MARGIN: Final = 5000
 #: How often the fault script looks at the time, and the main thread at the signals [s].
 TICK: Final = 0.005
 #: What to do if the port of the cameras cannot be had.
@@ -72,10 +72,11 @@ class EmulatedBench:
         """
         self._rig = rig
         self._settings = settings
+        _refuse_others(rig)
         built = robots or {}
         self._random = np.random.default_rng(settings.seed)
         self._failure: Exception | None = None
-        self.plcs: dict[str, PlcEmulator] = {}
+        self.plcs: dict[str, EmulatedDrives] = {}
         self.robots: dict[str, EmulatedRobot] = {}
         self._real: dict[str, Imperfections] = {}
         self._back: dict[str, RigidTransform] = {}
@@ -83,7 +84,7 @@ class EmulatedBench:
         for name, mounted in rig.robots.items():
             robot = built[name] if name in built else build_robot(load_robot(name))
             real = Imperfections(name, robot, settings.mismatch, settings.realistic, settings.seed)
-            self.plcs[name] = PlcEmulator(_plc_settings(mounted, settings, real))
+            self.plcs[name] = emulated_drives(mounted, settings, real)
             self.robots[name] = self._moved(name, mounted, real)
             self._real[name] = real
             self._back[name] = transform(mounted.calibration)
@@ -141,15 +142,16 @@ class EmulatedBench:
         """
         try:
             for name, plc in self.plcs.items():
-                plc.start(tcp=_address(self._rig.robots[name]))
-                self._opened.callback(plc.stop)
+                open_line(plc, self._rig.robots[name].plc, self._opened)
             self.motive.start()
             self._opened.callback(self.motive.stop)
-        except (HardwareError, OSError) as error:
+        except BaseException as error:
             self._opened.close()
-            raise DeviceError(
-                f"the bench cannot be emulated: {error}", hint=getattr(error, "hint", "")
-            ) from error
+            self.motive.stop()  # its port is taken since it was built
+            if isinstance(error, HardwareError | OSError):
+                hint = getattr(error, "hint", "")
+                raise DeviceError(f"the bench cannot be emulated: {error}", hint=hint) from error
+            raise
         return self
 
     def __exit__(
@@ -157,6 +159,16 @@ class EmulatedBench:
     ) -> None:
         """Close them."""
         self._opened.close()
+
+    @property
+    def places(self) -> dict[str, str]:
+        """Where the PLC of every robot is found."""
+        found = {}
+        for name, mounted in self._rig.robots.items():
+            plc = self.plcs[name]
+            host, port = plc.address if isinstance(plc, PlcEmulator) else ("", 0)
+            found[name] = f"{host}:{port}" if port else mounted.plc.place
+        return found
 
     def check(self) -> None:
         """Do nothing, unless a simulation broke down.
@@ -209,13 +221,16 @@ def emulate(
         time.sleep(TICK)
 
 
-def _address(mounted: MountedRobot) -> tuple[str, int]:
-    plc = mounted.plc
-    if not isinstance(plc, ModbusTcp):
+def _refuse_others(rig: RigFile) -> None:
+    """Refuse devices of other kinds."""
+    hint = "Emulate them by a program of your own; the other devices need a rig file with shipped kinds."
+    if plugin_of(rig.cameras) is not None:
         raise InputError(
-            "only PLCs on Modbus TCP are emulated from a rig file", hint="Use plc.kind: modbus_tcp."
+            f"only NatNet cameras are emulated from a rig file, not {rig.cameras.kind}", hint=hint
         )
-    return plc.host, plc.port
+    for mounted in rig.robots.values():
+        if plugin_of(mounted.plc) is not None:
+            raise InputError(f"only shipped kinds of drives are emulated, not {mounted.plc.kind}", hint=hint)
 
 
 def marker_names(rig: RigFile) -> list[str]:
@@ -242,26 +257,6 @@ def _labels(mounted: MountedRobot, modules: int) -> list[str]:
     base = [markers.base.format(node=node) for node in (1, 2, 3)]
     rings = range(1, modules + 1)
     return base + [markers.labels.format(ring=ring, node=node) for ring in rings for node in (1, 2, 3)]
-
-
-def _plc_settings(mounted: MountedRobot, settings: EmulationSettings, real: Imperfections) -> PlcSettings:
-    ranges = [_axis_range(cable) for cable in mounted.cables.values()]
-    axes = max(6, *(cable.axis for cable in mounted.cables.values()))
-    return PlcSettings(
-        axes=axes,
-        unit=mounted.plc.unit,
-        servo=real.servos(mounted, axes),
-        limits=PlcLimitSettings(
-            min_um=min(low for low, _ in ranges) - MARGIN,
-            max_um=max(high for _, high in ranges) + MARGIN,
-            watchdog_ms=settings.watchdog_ms,
-        ),
-    )
-
-
-def _axis_range(cable: CableDrive) -> tuple[int, int]:
-    ends = round(1e3 * cable.sign * cable.min_mm), round(1e3 * cable.sign * cable.max_mm)
-    return min(ends), max(ends)
 
 
 def _motive_settings(rig: RigFile, settings: EmulationSettings) -> MotiveSettings:

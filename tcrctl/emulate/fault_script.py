@@ -27,7 +27,6 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from tcr_hardware.emulators.motive import MotiveEmulator
-from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.emulators.plc_faults import FAULTS
 from tcr_hardware.modbus.registers import Status
 from tcrctl.config import strict_yaml
@@ -42,6 +41,7 @@ from tcrctl.emulate.camera_faults import (
     names_in,
     wrong_value,
 )
+from tcrctl.emulate.line import EmulatedDrives
 
 #: A drive that moves faster than this between two looks is moving [um].
 MOVING_UM = 30.0
@@ -142,7 +142,7 @@ class FaultPlayer:
         self,
         script: FaultScript,
         motive: MotiveEmulator,
-        plcs: Mapping[str, PlcEmulator],
+        plcs: Mapping[str, EmulatedDrives],
         notify: Callable[[str], None],
     ) -> None:
         """Take a script; ``notify`` takes what happens, for people."""
@@ -208,10 +208,10 @@ class FaultPlayer:
         others = {name: value for name, value in faults.items() if name not in CHANGES}
         motive.faults = dataclasses.replace(motive.faults, **others)
 
-    def _chosen(self, fault: Fault) -> list[PlcEmulator]:
+    def _chosen(self, fault: Fault) -> list[EmulatedDrives]:
         return [plc for name, plc in self._plcs.items() if fault.robot in (None, name)]
 
 
-def _status(plc: PlcEmulator) -> Status:
+def _status(plc: EmulatedDrives) -> Status:
     status = plc.snapshot()["status"]
     return status if isinstance(status, Status) else Status(0)

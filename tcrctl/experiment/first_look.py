@@ -63,14 +63,13 @@ def build_picture(
     return PictureJudge(settings, robot, period, frames, report) if settings.judged else Unjudged()
 
 
-def check_picture(settings: PictureSettings, robot: Robot, plant: Plant) -> None:
-    """Hold what the cameras show against the model, before drives are armed.
+def check_picture(settings: PictureSettings, robot: Robot, frames: Sequence[Measurement]) -> None:
+    """Hold what the cameras show of a robot at rest against the model, before drives are armed.
 
     Raises:
         ArmingRefusedError: If it cannot be believed.
-        DeviceError: If the plant cannot be measured.
     """
     if not settings.judged:
         return
-    if found := objections(settings, robot, first_frames(plant)):
+    if found := objections(settings, robot, frames):
         raise ArmingRefusedError([f"the cameras' picture is not believed: {found[0]}", *found[1:]], hint=HINT)

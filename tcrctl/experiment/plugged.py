@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
-from dataclasses import dataclass
 from functools import partial, partialmethod
 from pathlib import Path
 from typing import Any, Final, TypeVar, Union
@@ -25,6 +24,7 @@ from tcrctl.plugins.faults import told
 from tcrctl.plugins.groups import GROUPS, registered
 from tcrctl.plugins.origin import Origin
 from tcrctl.plugins.plugin import is_written_out, made_again, plugin_of, settings_of
+from tcrctl.plugins.trust import Trust
 from tcrctl.task.section import TaskSection
 from tcrctl.trajectory.section import TrajectorySection
 
@@ -39,22 +39,6 @@ BASES: Final[Mapping[str, type[Settings]]] = {
     "plant": PlantSection,
     "task": TaskSection,
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Trust:
-    """Whose code may run.
-
-    Attributes:
-        folder: Where relative paths of files start.
-        files: Whether a file or module may be run because the experiment names it; what ``--set`` names, and kinds
-            that are registered by installed packages, may always.
-        by_name: Files lie in the folder itself, whatever the path before their name is.
-    """
-
-    folder: Path
-    files: bool = True
-    by_name: bool = False
 
 
 def trust_of(path: Path) -> Trust:
@@ -176,10 +160,7 @@ def _is_override(document: Document, section: str) -> bool:
 
 def _file(document: Document, section: str, trust: Trust, place: str) -> Path:
     """Return the file that a kind means: relative to the experiment, or to where the user is with ``--set``."""
-    given = Path(place).expanduser()
-    if _is_override(document, section):
-        return given
-    return trust.folder / (given.name if trust.by_name else given)
+    return Path(place).expanduser() if _is_override(document, section) else trust.file(place)
 
 
 def _joined(model: type[Settings], section: str, found: type[Settings]) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -33,7 +33,7 @@ from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.robot import Robot, build_robot
-from tcrctl.signals import StepRecord
+from tcrctl.signals import Measurement, StepRecord
 from tcrctl.task.task import Task, build_task, task_targets
 from tcrctl.trajectory.start_blend import StartBlend
 from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
@@ -203,7 +203,11 @@ def build_plant(
 
 
 def build_parts(
-    experiment: Experiment, plant: Plant, state: TrueState | None, report: Report = unheard
+    experiment: Experiment,
+    plant: Plant,
+    state: TrueState | None,
+    report: Report = unheard,
+    frames: Sequence[Measurement] | None = None,
 ) -> tuple[Parts, float]:
     """Build estimator and controller for a plant at rest, and let the trajectory begin where the plant is.
 
@@ -212,6 +216,7 @@ def build_parts(
         plant: Is measured, not driven.
         state: Its true positions and velocities if it knows them.
         report: Takes what the loop has to say of the cameras' picture.
+        frames: Measurements of it, if they were taken already.
 
     Returns:
         The parts of a loop within the experiment's safety limits, for one run; and the distance of the measured
@@ -226,7 +231,7 @@ def build_parts(
     period = experiment.period
     trajectory, offset = experiment.trajectory, np.nan
     calibration = MarkerCalibration.of(spec.estimator.calibrated, robot.n_modules)
-    frames = first_frames(plant)
+    frames = first_frames(plant) if frames is None else frames
     found = measured_pose(frames, robot, calibration)
     if found is not None:
         offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))

@@ -9,7 +9,7 @@ import os
 import platform
 import socket
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -36,6 +36,7 @@ from tcrctl.log.file_names import (
 )
 from tcrctl.plant.cameras import draw_cameras
 from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plugins.origin import Origin
 from tcrctl.plugins.source import package_digest
 from tcrctl.robot.module import ring_rows
 
@@ -76,7 +77,7 @@ def own_files(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, bytes]:
     }
     if loaded.rig is not None:
         files[RIG] = loaded.rig.given
-    for name, (_, content) in plugin_files(spec).items():
+    for name, (_, content) in plugin_files(_all_origins(loaded, spec)).items():
         files[name.removeprefix(PLUGIN_FILE)] = content
     files |= table_file(spec.trajectory)
     named = isinstance(spec.plant, SimulatedSettings) and isinstance(spec.plant.robot, str)
@@ -102,19 +103,22 @@ def attachments(loaded: LoadedSpec, spec: ExperimentSpec) -> dict[str, tuple[str
         ROBOT: ("application/yaml", strict_yaml.read(loaded.robot_path)),
         **rig,
         **_drawn(loaded, spec),
-        **plugin_files(spec),
+        **plugin_files(_all_origins(loaded, spec)),
         **{name: ("application/octet-stream", data) for name, data in table_file(spec.trajectory).items()},
         VERSIONS: ("application/json", json.dumps(versions(), indent=2).encode()),
     }
 
 
-def plugin_files(spec: ExperimentSpec) -> dict[str, tuple[str, bytes]]:
-    """Return where kinds come from that are not built in, and the text of those that are files.
+def _all_origins(loaded: LoadedSpec, spec: ExperimentSpec) -> tuple[Origin, ...]:
+    return (*origins(spec), *(() if loaded.rig is None else loaded.rig.origins))
+
+
+def plugin_files(found: Sequence[Origin]) -> dict[str, tuple[str, bytes]]:
+    """Return a table of where kinds come from that are not built in, and the text of those that are files.
 
     Raises:
         InputError: If two different files have the same name.
     """
-    found = origins(spec)
     if not found:
         return {}
     texts: dict[str, tuple[str, bytes]] = {}

@@ -8,16 +8,16 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from tcrctl.errors import DeviceError, InputError, LogError, StoppedError, TcrctlError
-from tcrctl.experiment.first_look import check_picture
+from tcrctl.experiment.first_look import check_picture, first_frames
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.outcome import summary_of
 from tcrctl.experiment.prepare import Experiment, Notify, build_parts, build_plant, make_task, silent
@@ -43,7 +43,7 @@ from tcrctl.plant.rig.journal import Journal
 from tcrctl.plant.rig.operation import Operation
 from tcrctl.robot.module import RIGID_BARS, module_of, ring_rows
 from tcrctl.robot.robot import Robot
-from tcrctl.signals import StepRecord
+from tcrctl.signals import Measurement, StepRecord
 from tcrctl.task.settings import TaskSettings
 from tcrctl.task.task import task_drawing
 from tcrctl.trajectory.start_blend import StartBlend
@@ -109,7 +109,8 @@ def run_experiment(
         journal = Journal(pace.moment, notify)
         plant, state = build_plant(experiment, Operation(pace.time, journal.report, confirmed))
         try:
-            parts, start_offset = build_parts(experiment, plant, state, journal.report)
+            frames = first_frames(plant)
+            parts, start_offset = build_parts(experiment, plant, state, journal.report, frames)
             folder = make_run_folder(out, experiment.spec.name)
             log = _open_log(experiment, folder, realtime=realtime, tap=tap)
             journal.attach(log.event)
@@ -119,7 +120,8 @@ def run_experiment(
         except BaseException:
             plant.close()
             raise
-        summary = _recorded_run(experiment, replace(parts, pace=pace), plant, folder, log, progress)
+        run = _Run(experiment, replace(parts, pace=pace), plant, frames)
+        summary = _recorded_run(run, folder, log, progress)
     try:
         folder.write(SUMMARY, (json.dumps(summary.as_json(), indent=2) + "\n").encode())
     except DeviceError as error:  # the run is over and in the log
@@ -173,15 +175,26 @@ def log_geometry(
     )
 
 
-def _recorded_run(
-    experiment: Experiment,
-    parts: Parts,
-    plant: RunnablePlant,
-    folder: RunFolder,
-    log: LogWriter,
-    progress: Progress,
-) -> Summary:
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What is run.
+
+    Attributes:
+        experiment: The experiment.
+        parts: The loop.
+        plant: Is started and closed.
+        frames: Measurements of the plant at rest.
+    """
+
+    experiment: Experiment
+    parts: Parts
+    plant: RunnablePlant
+    frames: Sequence[Measurement]
+
+
+def _recorded_run(run: _Run, folder: RunFolder, log: LogWriter, progress: Progress) -> Summary:
     """Run, close the plant, finish the log."""
+    experiment, parts = run.experiment, run.parts
     metrics = Metrics(parts.steps, paced=isinstance(parts.pace, RealTime))
     task = make_task(experiment)
 
@@ -193,7 +206,7 @@ def _recorded_run(
         progress(step.k + 1, parts.steps)
 
     with log:
-        failure = _drive(experiment, replace(parts, record=record), plant, log)
+        failure = _drive(replace(run, parts=replace(parts, record=record)), log)
         summary = summary_of(
             experiment,
             folder.run_id,
@@ -215,21 +228,21 @@ def _recorded_run(
     return summary
 
 
-def _drive(experiment: Experiment, parts: Parts, plant: RunnablePlant, log: LogWriter) -> TcrctlError | None:
+def _drive(run: _Run, log: LogWriter) -> TcrctlError | None:
     """Go through all steps and leave the plant safe; return why it ended before the end, if it did."""
     failure: TcrctlError | None = None
-    started = False
+    experiment, plant, started = run.experiment, run.plant, False
     try:
-        with _pace_kept(experiment, parts.pace, log):
+        with _pace_kept(experiment, run.parts.pace, log):
             if experiment.paced:
-                check_picture(experiment.spec.safety.picture, experiment.robot, plant)
+                check_picture(experiment.spec.safety.picture, experiment.robot, run.frames)
             plant.start()
             started = True
-            run_loop(parts)
+            run_loop(run.parts)
     except TcrctlError as error:
         failure = _in_mid_run(error) if started else error
     finally:
-        parts.pace.end()
+        run.parts.pace.end()
         try:
             plant.close()
         except TcrctlError as error:  # what ended the run first is the reason

@@ -29,7 +29,7 @@ from tcrctl.experiment.summary import TASK, UNITS
 from tcrctl.experiment.table_file import with_samples
 from tcrctl.picture.settings import PictureSettings
 from tcrctl.plant.realistic import as_drawn
-from tcrctl.plant.rig.file import LoadedRig, load_rig
+from tcrctl.plant.rig.file import LoadedRig, load_rig, period_misfits
 from tcrctl.plant.settings import PlantSettings, SimulatedSettings
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.doubts import doubts
@@ -222,6 +222,9 @@ def read_spec(
     spec = spec.model_copy(update={"estimator": estimator, "trajectory": trajectory})
     named = spec.plant.rig_file
     rig = None if named is None else load_rig(named, robot, path.parent)
+    if rig is not None:
+        wrong = period_misfits(rig, spec.controller.period_s)
+        document.refuse((("controller", "period_s"), text) for text in wrong)
     own = plant_robot(document, spec.plant, robot, robot_path)
     notes = (*notes, *known, *(f"robot {robot.name}: {text}" for text in doubts(robot)))
     return LoadedSpec(spec, robot, given, path, robot_path, tuple(overrides), rig, own, notes)

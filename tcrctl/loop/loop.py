@@ -113,7 +113,7 @@ def tick(parts: Parts, k: int, applied: Command | None) -> Ticked:
     late, t0 = parts.pace.wait(t), now()
     seen, truth = plant.read(), plant.truth()
     t1 = now()
-    measured, doubt = parts.picture.judged(seen), parts.picture.doubt
+    measured, doubt = parts.picture.judged(seen, parts.pace.elapsed()), parts.picture.doubt
     estimate = parts.estimator.update(measured, still(measured) if applied is None else applied)
     t2 = now()
     ahead = (k + in_periods(parts.controller.ahead, parts.period)) * parts.period

@@ -33,6 +33,10 @@ class Pace(Protocol):
         """Return when an event happens that happens now [s]: between the step that is due and the next one."""
         ...
 
+    def elapsed(self) -> float:
+        """Return how long ago the first step began [s], missed steps counted: what waits, waits by this time."""
+        ...
+
     def end(self) -> None:
         """Note that no further step will come."""
         ...
@@ -60,6 +64,10 @@ class Unpaced:
         return self._time
 
     def moment(self) -> float:
+        """Return the time of the last step [s]."""
+        return self._time
+
+    def elapsed(self) -> float:
         """Return the time of the last step [s]."""
         return self._time
 
@@ -100,14 +108,15 @@ class RealTime:
         self._clock = clock
         self._sleep = sleep
         self._start: float | None = None
-        self._due, self._ended = 0.0, False
+        self._first, self._due, self._ended = 0.0, 0.0, False
 
     def wait(self, t: float) -> float:
         """Wait until the start plus ``t``; return the lateness [s]."""
         self._check()
         self._due = t
         if self._start is None:
-            self._start = self._clock() - t
+            self._first = self._clock()
+            self._start = self._first - t
         while (left := self._start + t - self._clock()) > 0.0:
             self._sleep(min(left, LONGEST_NAP))
             self._check()
@@ -131,6 +140,10 @@ class RealTime:
         not held back.
         """
         return self.time() if self._ended else min(self.time(), self._due + self._period)
+
+    def elapsed(self) -> float:
+        """Return the time since the first step began [s]; 0 before it."""
+        return 0.0 if self._start is None else self._clock() - self._first
 
     def end(self) -> None:
         """Note that no further step will come."""

@@ -70,9 +70,10 @@ class PictureJudge:
         self.doubt = ""
         self._settings, self._period = settings, period
         self._limits, self._anatomy = limits_in_motion(settings), anatomy_of(robot)
-        self._notes = PictureNotes(report, period)
+        self._notes = PictureNotes(report)
         n = robot.n_modules
-        self._out, self._frame_out, self._held = np.zeros(RING * n, np.bool_), False, 0
+        self._out, self._frame_out = np.zeros(RING * n, np.bool_), False
+        self._now, self._held_since = 0.0, 0.0
         self._last: tuple[float, Array] = (-np.inf, np.full((n, RING), np.nan))
         self._noise, self._blend = 0.0, 1.0
         shapes = []
@@ -88,8 +89,14 @@ class PictureJudge:
         is_strange(self._start, shape, self._limits, self._noise)
         self._searched(measured.nodes.astype(float), measured.valid, shape)
 
-    def judged(self, measured: Measurement) -> Measurement:
-        """Return the frame without what is not believed; the frame itself if all of it is."""
+    def judged(self, measured: Measurement, elapsed: float) -> Measurement:
+        """Return the frame without what is not believed; the frame itself if all of it is.
+
+        Args:
+            measured: The frame.
+            elapsed: Time since the first step of the run, missed steps counted [s].
+        """
+        self._now = elapsed
         nodes, seen = measured.nodes.astype(float), measured.valid
         shape = shape_of(self._anatomy, nodes, seen)
         self._listen(measured.t, shape.side)
@@ -104,8 +111,13 @@ class PictureJudge:
         return replace(measured, valid=seen & ~verdict.out)
 
     def broken(self, step: int) -> PictureError | None:
-        """Return why the run must stop now; None if it need not."""
-        if not self.doubt or self._held * self._period <= self._settings.stop_s:
+        """Return why the run must stop now; None if it need not.
+
+        It stops in the step that is nearest to the limit of time, so that steps that begin a little early or late
+        make no difference; a step that was missed, or one that took long, is time in which the drives were held.
+        """
+        held = self._now - self._held_since
+        if not self.doubt or held <= self._settings.stop_s - 0.5 * self._period:
             return None
         return PictureError(step, self.doubt)
 
@@ -148,5 +160,6 @@ class PictureJudge:
             self._noise += self._blend * (change / (MEDIAN * TWO_FRAMES) - self._noise)
 
     def _doubt(self, verdict: Verdict, *, few: bool) -> None:
-        self._held = self._held + 1 if few else 0
-        self.doubt = self._notes.note(verdict.suspects, held=few)
+        if not self.doubt:
+            self._held_since = self._now
+        self.doubt = self._notes.note(verdict.suspects, self._now, held=few)

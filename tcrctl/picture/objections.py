@@ -19,7 +19,7 @@ from tcrctl.picture.limits import limits_before_arming
 from tcrctl.picture.settings import PictureSettings
 from tcrctl.picture.shape import Anatomy, anatomy_of, shape_of
 from tcrctl.picture.shares import Shares, joint_shares, side_shares
-from tcrctl.picture.suspects import Verdict, wrong_markers, wrong_rings
+from tcrctl.picture.suspects import Verdict, named, wrong_markers, wrong_rings
 from tcrctl.robot.equilibrium import equilibrium
 from tcrctl.robot.module import RING, ring_rows
 from tcrctl.robot.robot import Robot
@@ -27,8 +27,6 @@ from tcrctl.signals import Array, Measurement
 
 #: A mirror image that fits so many times better is one.
 BETTER: Final = 2.0
-#: So many suspects are named.
-NAMED: Final = 3
 #: Labels of a ring that is turned by more than this have moved on by a marker [rad].
 MOVED_ON: Final = np.radians(60.0)
 
@@ -70,18 +68,9 @@ def objections(settings: PictureSettings, robot: Robot, frames: Sequence[Measure
     return [
         *_frame(settings, over),
         *(_hints(picture, over, sized) if wrong else ()),
-        *_told(verdict),
+        *named(verdict.suspects),
         *_places(settings, picture, over, wrong),
     ]
-
-
-def _told(verdict: Verdict) -> Iterator[str]:
-    """Yield the first suspects, and how many more there are."""
-    for suspect in verdict.suspects[:NAMED]:
-        yield f"{suspect.name} is not believed: {suspect.why}"
-    more = len(verdict.suspects) - NAMED
-    if more > 0:
-        yield f"and {more} more"
 
 
 def picture_of(robot: Robot, frames: Sequence[Measurement]) -> Picture:

@@ -17,8 +17,13 @@ class Picture(Protocol):
 
     doubt: str
 
-    def judged(self, measured: Measurement) -> Measurement:
-        """Return the frame of this step without the markers that are not believed."""
+    def judged(self, measured: Measurement, elapsed: float) -> Measurement:
+        """Return the frame of this step without the markers that are not believed.
+
+        Args:
+            measured: The frame.
+            elapsed: Time since the first step of the run, missed steps counted [s].
+        """
         ...
 
     def broken(self, step: int) -> PictureError | None:
@@ -31,8 +36,9 @@ class Unjudged:
 
     doubt = ""
 
-    def judged(self, measured: Measurement) -> Measurement:
+    def judged(self, measured: Measurement, elapsed: float) -> Measurement:
         """Return the frame."""
+        del elapsed
         return measured
 
     def broken(self, step: int) -> None:

@@ -41,7 +41,9 @@ class PictureSettings(Settings):
         gt=0,
         le=1,
     )
-    stop_s: float = quantity("s", "the run is stopped if they were held for so long", 0.2, ge=0)
+    stop_s: float = quantity(
+        "s", "the run is stopped if they were held for so long, steps that were missed included", 0.2, ge=0
+    )
     start_side_mm: float = quantity(
         "mm", "before arming: sides of a ring may differ by so much from the robot's", 10.0, gt=0
     )

@@ -66,7 +66,10 @@ def joints(change: Shape, limits: Limits, noise: float) -> tuple[Array, Array, A
         allowed = joint + limits.per_bend * np.hypot(bend[0], bend[1]) + room
         sideways[i] = _known(np.hypot(x - limits.pull * bend[0], y - limits.pull * bend[1]) / allowed)
         expected, moved = _beside(change.offset[:, 2], i) if limits.along else (0.0, 0.0)
-        along[i] = _known(abs(z - expected) / (limits.joint + limits.along * moved + room))
+        more = limits.along * moved
+        if expected != expected:  # nothing is known beside it: but no joint gives more than it can
+            expected, more = 0.0, GIVE
+        along[i] = _known(abs(z - expected) / (limits.joint + more + room))
         twist[i] = _known(abs(change.twist[i]) / (angle + IN_TWIST * _room(noise)))
     return sideways, along, twist
 

@@ -8,7 +8,7 @@ left is looked at again.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -29,6 +29,8 @@ ALONE: Final = 0.5
 #: smaller one, if it is beyond its limit, too.
 NOT_THE_FRAME: Final = 0.7
 NOR_ELSEWHERE: Final = 0.25
+#: So many suspects are named.
+NAMED: Final = 3
 #: The frame of the cameras among the rings: that of the base.
 FRAME: Final = 0
 
@@ -46,6 +48,19 @@ class Suspect:
     name: str
     why: str
     ring: int
+
+    def said(self, before: str = ": ") -> str:
+        """Return what is not believed and why; ``before`` stands before the reason."""
+        return f"{self.name} is not believed{before}{self.why}"
+
+
+def named(suspects: Sequence[Suspect], before: str = ": ") -> list[str]:
+    """Return the first suspects as in :meth:`Suspect.said`, and last how many more there are."""
+    more = len(suspects) - NAMED
+    return [
+        *(suspect.said(before) for suspect in suspects[:NAMED]),
+        *([f"and {more} more"] if more > 0 else ()),
+    ]
 
 
 @dataclass(slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +13,9 @@ from tcrctl.analysis.history import History
 from tcrctl.experiment.headline import number
 from tcrctl.plots import style
 from tcrctl.signals import Array
+
+#: Width of a panel by its longest bar: behind that stands the number.
+_ROOM: Final = 1.5
 
 
 def draw(histories: Sequence[History]) -> Figure:
@@ -51,5 +55,5 @@ def _draw(panel: Axes, values: Sequence[Array], middle: Callable[[Array], float]
         panel.plot([usual], [i], color=colour, marker="o", ms=4, ls="")
         beside = {"xytext": (3, 0), "textcoords": "offset points", "va": "center", "fontsize": "x-small"}
         panel.annotate(number(most), (most, i), **beside)  # type: ignore[arg-type]
-    panel.margins(x=0.3)
-    panel.set_xlim(left=0.0)
+    most = max((float(np.nanmax(found)) for found in values if np.isfinite(found).any()), default=1.0)
+    panel.set_xlim(0.0, _ROOM * (most or 1.0))

@@ -74,15 +74,31 @@ def _task(panel: Axes, drawing: Drawing, plane: Plane) -> None:
         named.add(outline.kind)
         panel.plot(*flat.T, color=_EDGES[outline.kind], lw=0.7, label=label)
         if outline.label:
-            panel.annotate(outline.label, flat.mean(axis=0), fontsize="x-small", ha="center", va="bottom")
-    across = np.cross(plane.right, plane.up)
-    for ball in drawing.balls:
-        rim = plane.flat(1e3 * circle(ball.centre, across, ball.radius))
-        panel.fill(*rim.T, color=style.ORANGE, alpha=0.6, lw=0.0)
-        panel.annotate(ball.name, rim.mean(axis=0), fontsize="x-small", ha="center", va="center")
-    for passage in drawing.passages:
+            _beside(panel, outline.label, flat, -1)
+    _balls(panel, drawing, plane)
+    for i, passage in enumerate(drawing.passages):
         ends = np.stack((passage.entry, passage.entry + (passage.length + passage.screen) * passage.axis))
-        panel.plot(*plane.flat(1e3 * ends).T, color=style.ORANGE, lw=0.7, ls=(0, (4, 2)))
+        look: dict[str, Any] = {"color": style.ORANGE, "lw": 0.7, "ls": (0, (4, 2))}
+        panel.plot(*plane.flat(1e3 * ends).T, **look, label=None if i else "axis")
+
+
+def _balls(panel: Axes, drawing: Drawing, plane: Plane) -> None:
+    """Draw objects; names of those on the left stand left of them, so that neighbours do not cover each other's."""
+    across = np.cross(plane.right, plane.up)
+    rims = [plane.flat(1e3 * circle(ball.centre, across, ball.radius)) for ball in drawing.balls]
+    middle = np.mean([rim[:, 0].mean() for rim in rims]) if rims else 0.0
+    for i, (ball, rim) in enumerate(zip(drawing.balls, rims, strict=True)):
+        panel.fill(*rim.T, color=style.ORANGE, alpha=0.6, lw=0.0, label=None if i else "object")
+        _beside(panel, ball.name, rim, 1 if rim[:, 0].mean() >= middle else -1)
+
+
+def _beside(panel: Axes, text: str, outline: Array, side: int) -> None:
+    """Write a name to the left (-1) or right (1) of an outline (n, 2) [mm]."""
+    edge = outline[:, 0].max() if side > 0 else outline[:, 0].min()
+    look: dict[str, Any] = {"fontsize": "x-small", "ha": "left" if side > 0 else "right", "va": "center"}
+    panel.annotate(
+        text, (edge, outline[:, 1].mean()), xytext=(3 * side, 0), textcoords="offset points", **look
+    )
 
 
 def _alike(one: Drawing, other: Drawing) -> bool:

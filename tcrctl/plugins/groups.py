@@ -1,4 +1,4 @@
-"""Sections of an experiment whose kinds may come from elsewhere, and what packages have registered for them."""
+"""Sections of experiments and rig files whose kinds may come from elsewhere, and what packages have registered."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import EntryPoint
 from typing import Final
 
-#: Group of entry points of every section.
+#: Group of entry points of every section of an experiment.
 GROUPS: Final[Mapping[str, str]] = {
     "trajectory": "tcrctl.trajectories",
     "controller": "tcrctl.controllers",
@@ -15,11 +15,13 @@ GROUPS: Final[Mapping[str, str]] = {
     "plant": "tcrctl.plants",
     "task": "tcrctl.tasks",
 }
+#: The same of a rig file.
+DEVICES: Final[Mapping[str, str]] = {"cameras": "tcrctl.cameras", "plc": "tcrctl.drives"}
 
 
 def registered(section: str) -> Sequence[EntryPoint]:
     """Return what installed packages have registered for a section, sorted by name; looks at all packages."""
-    found = importlib.metadata.entry_points(group=GROUPS[section])
+    found = importlib.metadata.entry_points(group={**GROUPS, **DEVICES}[section])
     # a package may be found twice, in a checkout and where it is installed
     different = {(point.name, point.value, package_of(point)): point for point in found}
     return [different[key] for key in sorted(different)]

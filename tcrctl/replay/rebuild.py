@@ -9,11 +9,12 @@ from typing import Final
 
 from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError, SpecError
-from tcrctl.experiment.plugged import Trust, validated, with_plugins
+from tcrctl.experiment.plugged import validated, with_plugins
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, misfits
 from tcrctl.log.file_names import RESOLVED, ROBOT, SPEC
 from tcrctl.log.reader import Log
 from tcrctl.log.run_files import RunFiles
+from tcrctl.plugins.trust import Trust
 from tcrctl.robot.description import RobotDescription
 from tcrctl.trajectory.sampled_section import SampledSection
 

@@ -18,8 +18,9 @@ class RecordedPicture:
         """Take the recording, which has moved on to a step before that step is judged."""
         self._plant, self.doubt = plant, ""
 
-    def judged(self, measured: Measurement) -> Measurement:
+    def judged(self, measured: Measurement, elapsed: float) -> Measurement:
         """Return what was recorded."""
+        del elapsed  # how long it took to run is in the record
         reason = self._plant.step.info.reason
         self.doubt = reason.removeprefix(HELD) if reason.startswith(HELD) else ""
         return measured

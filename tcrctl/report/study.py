@@ -62,12 +62,11 @@ def study_page(found: Findings, result: Done, folder: Path) -> str:
     asset = files(__package__)
     runs = done(result.runs, result.rows)
     groups, *differences = found.tables()
-    whole = result.missing == 0
     return Template(asset.joinpath("study.html").read_text("utf-8")).substitute(
         name=escape(spec.name),
         description=escape(spec.description),
-        status="complete" if whole else f"{result.missing} runs missing",
-        verdict="good" if whole else "unclear",
+        status=escape(_status(result)),
+        verdict="unclear" if result.missing else "bad" if result.unanswered else "good",
         subtitle=escape(f"{len(runs)} runs; {spec.source}".rstrip("; ")),
         groups=_table(groups),
         differences="".join(f"<section><h2>Pair by pair</h2>{_table(t)}</section>" for t in differences),
@@ -77,6 +76,12 @@ def study_page(found: Findings, result: Done, folder: Path) -> str:
         version=escape(__version__),
         style=asset.joinpath("page.css").read_text("utf-8"),
     )
+
+
+def _status(result: Done) -> str:
+    if result.missing:
+        return f"{result.missing} runs missing"
+    return result.unanswered or "complete"
 
 
 def _table(table: TextTable) -> str:

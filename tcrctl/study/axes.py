@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     Discriminator,
     Field,
@@ -54,9 +56,9 @@ Values: TypeAlias = Annotated[tuple[Any, ...], Field(min_length=1)]
 
 
 def _axis_tag(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return "(values)"
-    keys = value.keys() if isinstance(value, dict) else type(value).model_fields if value is not None else ()
+    if not isinstance(value, dict | Settings):
+        return "(values)"  # or none of the three: one value is no list
+    keys = value.keys() if isinstance(value, dict) else type(value).model_fields
     return "(normal)" if "mean" in keys or "std" in keys else "(range)"
 
 
@@ -84,6 +86,14 @@ def _seeds(value: Any) -> Any:
     return tuple(range(int(first), int(last) + 1))
 
 
+def _different(seeds: tuple[int, ...]) -> tuple[int, ...]:
+    """Refuse a seed that is there twice: the same run would count as two."""
+    if len(set(seeds)) < len(seeds):
+        twice = next(seed for seed, count in Counter(seeds).items() if count > 1)
+        raise PydanticCustomError("seeds", "seed {seed} is given twice", {"seed": twice})
+    return seeds
+
+
 def _shortly(seeds: tuple[int, ...]) -> str | list[int]:
     first, last = seeds[0], seeds[-1]
     return f"{first}..{last}" if seeds == tuple(range(first, last + 1)) else list(seeds)
@@ -93,6 +103,7 @@ Seed: TypeAlias = Annotated[int, Field(ge=0, lt=2**63)]
 Seeds: TypeAlias = Annotated[
     Annotated[tuple[Seed, ...], Field(min_length=1, strict=False)],
     BeforeValidator(_seeds),
+    AfterValidator(_different),
     PlainSerializer(_shortly),
     WithJsonSchema(
         {

@@ -38,16 +38,24 @@ class Estimate:
             "estimated_s": self.seconds,
         }
 
-    def lines(self) -> Iterator[str]:
-        """Yield the table of runs, shortened, and a sentence."""
-        yield "  ".join((*(self.runs[0].levels if self.runs else ()), "seed"))
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """What stands above the table of runs."""
+        return (*(self.runs[0].levels if self.runs else ()), "seed")
+
+    def rows(self) -> Iterator[tuple[str, ...]]:
+        """Yield the table of runs, shortened."""
         for i, run in enumerate(self.runs):
             if i < SHOWN or i >= len(self.runs) - SHOWN:
-                yield "  ".join((*run.levels.values(), str(run.seed)))
+                yield (*run.levels.values(), str(run.seed))
             elif i == SHOWN:
-                yield f"... {len(self.runs) - 2 * SHOWN} more ..."
-        took = "no run of it has been timed yet" if self.seconds is None else f"about {self.seconds:.0f} s"
-        yield f"{len(self.runs)} runs, {self.missing} of them to be done: {took}"
+                yield (f"... {len(self.runs) - 2 * SHOWN} more ...", *[""] * (len(self.titles) - 1))
+
+    @property
+    def sentence(self) -> str:
+        """How many runs there are, and how long they may take."""
+        took = "not timed yet" if self.seconds is None else f"about {self.seconds:.0f} s"
+        return f"{len(self.runs)} runs, {self.missing} of them to be done: {took}"
 
 
 def estimate(runs: Sequence[PlannedRun], folder: Path, jobs: int) -> Estimate:

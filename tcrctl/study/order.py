@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
-from tcrctl.errors import InfeasibleError, TcrctlError, TimeLimitError
+from tcrctl.errors import InfeasibleError, NoEquilibriumError, TcrctlError, TimeLimitError
 from tcrctl.experiment.prepare import Experiment, plan, prepare
 from tcrctl.experiment.random_path import random_path
 from tcrctl.experiment.run import run_experiment
@@ -57,7 +57,7 @@ def do(order: Order) -> Row | None:
     begin = time.monotonic()
     try:
         row = _done(order, _limit(order.timeout_s, begin))
-    except InfeasibleError as error:
+    except (InfeasibleError, NoEquilibriumError) as error:
         row = Row(order.address, "infeasible", str(error))
     except TimeLimitError as error:
         row = Row(order.address, "timeout", str(error))

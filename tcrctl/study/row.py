@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias, get_args
 
 Status: TypeAlias = Literal["success", "failed", "aborted", "error", "infeasible", "timeout", "crashed"]
-"""As in ``run --json``; and: the path was refused, the time limit was passed, the process died."""
+"""As in ``run --json``; and: path or robot were refused, the time limit was passed, the process died."""
 
 #: Runs that came to their end.
 FINISHED: Final[tuple[Status, ...]] = ("success", "failed")
-#: What says something of the computer, not of the experiment, and may be tried again.
-OF_THE_MACHINE: Final[tuple[Status, ...]] = ("timeout", "crashed")
+#: What is an answer of the experiment: that a limit stopped it, or that its path was refused, is one too.
+ANSWERS: Final[tuple[Status, ...]] = (*FINISHED, "aborted", "infeasible")
+#: Exit code of what was asked of runs, some of which have no result.
+WITHOUT_RESULT: Final = 3
 #: Results that no two runs have in common.
 TIMING: Final = ("control_ms", "latency_ms", "overruns")
 #: Results that are not of the run, or stand elsewhere in the row.
@@ -52,18 +55,41 @@ class Row:
         """Whether the run came to its end."""
         return self.status in FINISHED
 
+    @property
+    def answered(self) -> bool:
+        """Whether the run says something of the experiment; one that crashed or timed out may be tried again."""
+        return self.status in ANSWERS
+
     def dumps(self) -> bytes:
         """Return the row as one line of JSON."""
         return json.dumps(dataclasses.asdict(self), separators=(",", ":")).encode() + b"\n"
 
 
+def unanswered(rows: Sequence[Row]) -> str:
+    """Say how many runs crashed, timed out or ended in an error; nothing if none did."""
+    found = Counter(row.status for row in rows if not row.answered)
+    kinds = ", ".join(f"{count} {status}" for status, count in sorted(found.items()))
+    return f"{found.total()} of {len(rows)} runs without a result: {kinds}" if found else ""
+
+
 def loads(line: bytes) -> Row | None:
-    """Read a line; return None if it is not one that was written whole."""
+    """Read a line; return None if it is not one that was written whole, or holds values of other types."""
     try:
-        data = json.loads(line)
-        return Row(**data) if line.endswith(b"\n") else None
-    except (ValueError, TypeError):
+        row = Row(**json.loads(line))
+    except (ValueError, TypeError, RecursionError):
         return None
+    return row if line.endswith(b"\n") and _is_sound(row) else None
+
+
+def _is_sound(row: Row) -> bool:
+    texts = (row.address, row.reason, row.program, "" if row.log is None else row.log)
+    maps = (row.result, row.timing, row.path)
+    return (
+        row.status in get_args(Status)
+        and all(isinstance(text, str) for text in texts)
+        and all(isinstance(part, dict) for part in maps)
+        and isinstance(row.seconds, int | float)
+    )
 
 
 def same_every_time(result: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterator
-from itertools import combinations
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -15,10 +14,12 @@ from tcrctl.config.settings import Positive, Settings, quantity, refuse
 from tcrctl.experiment.summary import TASK, UNITS
 from tcrctl.robot.sections import Name
 from tcrctl.study.axes import MOST_RUNS, Axis, NormalSettings, RangeSettings, Seeds
+from tcrctl.study.key_conflicts import SEED as SEED
+from tcrctl.study.key_conflicts import key_conflicts
 
 Design = Literal["grid", "zip", "random", "sobol", "latin"]
 SAMPLED = ("random", "sobol", "latin")
-EXPERIMENT, CASE, SEED = "experiment", "case", "seed"
+EXPERIMENT, CASE = "experiment", "case"
 MEASURES = ("position_error_mm.max", "orientation_error_deg.max")
 
 
@@ -93,7 +94,7 @@ class StudySpec(Settings):
 
     @model_validator(mode="after")
     def _agrees(self) -> StudySpec:
-        refuse([*_key_conflicts(self), *_design_conflicts(self), *_unknown_names(self)])
+        refuse([*key_conflicts(self), *_design_conflicts(self), *_unknown_names(self)])
         if self.runs > MOST_RUNS:
             where = "vary" if self.vary else "seeds"
             refuse([((where,), f"the study makes {self.runs} runs; at most {MOST_RUNS} are allowed")])
@@ -104,30 +105,6 @@ def _length(axis: Any) -> int:
     if isinstance(axis, RangeSettings):
         return axis.steps or 0
     return 0 if isinstance(axis, NormalSettings) else len(axis)
-
-
-def _overlap(a: str, b: str) -> bool:
-    """Tell whether one key is the other or a section around it."""
-    return f"{a}.".startswith(f"{b}.") or f"{b}.".startswith(f"{a}.")
-
-
-def _key_conflicts(spec: StudySpec) -> Iterator[Finding]:
-    for section, keys in (("set", spec.set), ("vary", spec.vary)):
-        if SEED in keys:
-            yield (section, SEED), "seeds are varied by seeds"
-    for first, second in combinations(spec.vary, 2):
-        if _overlap(first, second):
-            yield ("vary", second), f"excludes {first}, which is varied too"
-    for key in spec.vary:
-        if key in spec.set:
-            yield ("set", key), "is varied too"
-        for case, changes in spec.cases.items():
-            for other in changes:
-                if _overlap(key, other):
-                    yield ("cases", case, other), f"excludes {key}, which is varied too"
-    for case, changes in spec.cases.items():
-        if SEED in changes:
-            yield ("cases", case, SEED), "seeds are varied by seeds"
 
 
 def _design_conflicts(spec: StudySpec) -> Iterator[Finding]:

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from tcrctl.errors import DeviceError
-from tcrctl.study.row import OF_THE_MACHINE, Row, loads
+from tcrctl.study.row import Row, loads
 
 ROWS: Final = "rows.jsonl"
 LOCK: Final = "lock"
@@ -92,10 +92,10 @@ class Store:
         self._places[row.address] = size, len(line)
 
     def forget(self, addresses: Iterable[str]) -> None:
-        """Count runs that timed out or crashed as not done; a later row of the same address counts."""
+        """Count runs without a result as not done; a later row of the same address counts."""
         for address in addresses:
             row = self.get(address)
-            if row is not None and row.status in OF_THE_MACHINE:
+            if row is not None and not row.answered:
                 del self._places[address]
 
     def _scan(self) -> None:

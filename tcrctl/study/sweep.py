@@ -22,7 +22,7 @@ from tcrctl.study.design import Cell
 from tcrctl.study.loading import LoadedStudy
 from tcrctl.study.order import Logs, Order, do
 from tcrctl.study.plan import PlannedRun
-from tcrctl.study.row import Row
+from tcrctl.study.row import WITHOUT_RESULT, Row, unanswered
 from tcrctl.study.store import Store
 
 #: The study as it was run, in its folder; and where logs go there.
@@ -30,6 +30,7 @@ STUDY: Final = "study.yaml"
 RUNS: Final = "runs"
 #: A process is ended if a run is late by this factor of its time limit, and by this time [s]: it hangs.
 PATIENCE, PATIENCE_S = 1.5, 30.0
+
 
 Told = Callable[[PlannedRun, Row], None]
 
@@ -60,9 +61,16 @@ class Done:
         return sum(row is None for row in self.rows)
 
     @property
+    def unanswered(self) -> str:
+        """Say how many of the runs that are done have no result; nothing if all have one."""
+        return unanswered([row for row in self.rows if row is not None])
+
+    @property
     def exit_code(self) -> int:
-        """Of :mod:`tcrctl.errors`: that some runs failed is a result, not a failure of the study."""
-        return 0 if self.interruption is None else self.interruption.exit_code
+        """Of :mod:`tcrctl.errors`: a missed criterion or a limit is a result, a run without a result is 3."""
+        if self.interruption is not None:
+            return self.interruption.exit_code
+        return WITHOUT_RESULT if self.unanswered else 0
 
 
 def folder_of(study: LoadedStudy, out: Path) -> Path:
@@ -88,7 +96,7 @@ def sweep(
         engine: Where.
         out: Where the folder of the study is, or is made.
         logs: Which logs are kept, of runs that are done now.
-        retry: Do those again that timed out or crashed.
+        retry: Do those again that have no result.
         told: Is told of every run when it is done.
 
     Raises:

@@ -21,7 +21,7 @@ from tcrctl.study.design import Cell
 from tcrctl.study.groups import Run, done
 from tcrctl.study.loading import LoadedStudy
 from tcrctl.study.plan import PlannedRun, planned
-from tcrctl.study.row import Row
+from tcrctl.study.row import Row, unanswered
 from tcrctl.study.settings import CASE, CompareSettings, StudySpec
 from tcrctl.study.sweep import sweep
 from tcrctl.tune.score import Scales, by_case, scales, score
@@ -63,6 +63,7 @@ class Tuned:
         held_out_before: On the plants that judge, with the shipped ones.
         held_out_after: With the best ones.
         best: Best worst decile after every generation.
+        unanswered: How many of the runs that are compared have no result; nothing if all have one.
         judging: The study on the plants that judge, shipped against tuned.
         runs: Its runs.
     """
@@ -73,13 +74,14 @@ class Tuned:
     held_out_before: float
     held_out_after: float
     best: tuple[float, ...]
+    unanswered: str
     judging: StudySpec
     runs: tuple[Run, ...]
 
     @property
     def better(self) -> bool:
-        """Whether the worst decile is lower on plants that were not seen."""
-        return self.held_out_after < self.held_out_before
+        """Whether the worst decile is lower on plants that were not seen; nobody knows if a run has no result."""
+        return not self.unanswered and self.held_out_after < self.held_out_before
 
 
 @dataclass
@@ -91,10 +93,20 @@ class _Trials:
     out: Path
     told: Told
 
-    def runs(self, settings: Mapping[str, Mapping[str, Any]], seeds: Sequence[int]) -> list[Run]:
-        """Run sets of settings by name."""
+    def runs(
+        self, settings: Mapping[str, Mapping[str, Any]], seeds: Sequence[int], *, retry: bool = False
+    ) -> list[Run]:
+        """Run sets of settings by name; ``retry``: again what had no result when it was tried before."""
         study = replace(self.study, spec=self.spec(settings, seeds))
-        result = sweep(study, planned(study), engine=self.engine, out=self.out, logs="none", told=self.told)
+        result = sweep(
+            study,
+            planned(study),
+            engine=self.engine,
+            out=self.out,
+            logs="none",
+            retry=retry,
+            told=self.told,
+        )
         if result.interruption is not None:
             raise result.interruption
         return done(result.runs, result.rows)
@@ -133,15 +145,16 @@ def tune(study: LoadedStudy, search: Search, *, engine: Engine, out: Path, told:
     if {*seeds} & {*search.held_out}:
         raise InputError("the plants that judge must not be those that are tuned on", hint="See --held-out.")
     trials = _Trials(study, engine, out, told)
-    shipped = trials.runs({SHIPPED: {}}, seeds)
+    shipped = trials.runs({SHIPPED: {}}, seeds, retry=True)
     sizes = scales(shipped, measure)
     before = score(shipped, measure, sizes)
     settings, after, best = _searched(trials, space, search, sizes, before)
     both = {SHIPPED: {}, TUNED: settings}
-    judged = trials.runs(both, search.held_out)
+    judged = trials.runs(both, search.held_out, retry=True)
     marks = {name: score(runs, measure, sizes) for name, runs in by_case(judged).items()}
     judging = trials.spec(both, search.held_out)
-    return Tuned(settings, before, after, marks[SHIPPED], marks[TUNED], best, judging, tuple(judged))
+    lost = unanswered([row for _, row in (*shipped, *judged)])
+    return Tuned(settings, before, after, marks[SHIPPED], marks[TUNED], best, lost, judging, tuple(judged))
 
 
 def _searched(

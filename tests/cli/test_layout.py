@@ -10,12 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from support import records
+from support.engines import stay_here
 from support.log_files import open_log
+from support.studies import study_file
 from tcrctl.cli import paper
 from tcrctl.cli.app import main
 from tcrctl.cli.layout import fact, laid_out
 from tcrctl.paper.report import Line, make_line
 from tcrctl.paper.table import ROWS
+from tcrctl.study.address import program
+from tcrctl.study.row import Row
 
 WORDS = st.text("abcdefgh", min_size=1, max_size=12)
 CELLS = st.lists(WORDS, max_size=12).map(" ".join)
@@ -120,3 +124,20 @@ def test_info_says_what_failed_right_after_the_status_to_four_digits(log, capsys
     lines = said(capsys, ["info", str(log)]).splitlines()
     at = next(i for i, line in enumerate(lines) if line.startswith("status"))
     assert lines[at + 1].split(None, 1)[1] == "FAILED: position_error_mm.max is 9.877 mm, must be <= 3 mm"
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120])
+def test_a_study_keeps_to_the_width_of_the_terminal(columns, tmp_path, capsys, monkeypatch):
+    stay_here(monkeypatch)
+    monkeypatch.setenv("COLUMNS", str(columns))
+    result = {"position_error_mm": {"max": 1.23456789, "rms": 0.5}}
+    pretended = lambda order: Row(order.address, "success", "", result, program=program())  # noqa: E731
+    monkeypatch.setattr("tcrctl.study.sweep.do", pretended)
+    cases = {"as it is": {}, "another latency of the cameras": {"plant.latency_ms": 5}}
+    path = study_file(tmp_path, seeds=[0, 1], cases=cases, compare={"factor": "case", "against": "as it is"})
+    assert main(["sweep", str(path), "--out", "logs", "--jobs", "1", "--dry-run"]) == 0
+    monkeypatch.chdir(tmp_path)
+    assert main(["sweep", "quick.yaml", "--out", "logs", "--jobs", "1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= columns, lines
+    assert " ".join(" ".join(lines).split()).count("1.23") >= 2

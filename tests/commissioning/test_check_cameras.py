@@ -9,17 +9,24 @@ import pytest
 from support.fault_matrix import PATIENT, WatchedEmulators
 from tcr_hardware.emulators.motive import CLOCK_HZ, MotiveEmulator
 from tcr_hardware.emulators.motive_settings import MotiveSettings
+from tcr_hardware.emulators.plc_program import PlcProgram
 from tcrctl.commissioning.check import check_rig
 
 pytestmark = pytest.mark.slow
 
 
-def findings(robot, faults=None, **settings):
+def lines(robot, faults=None, **settings):
+    """Everything that is found."""
     motive = MotiveSettings(**{"command_port": 0, "rate_hz": 200.0, **settings})
     with WatchedEmulators(robot, PATIENT, motive_settings=motive) as emulators:
         for name, value in (faults or {}).items():
             setattr(emulators.motive.faults, name, value)
-        return {found.what: found for found in check_rig(emulators.loaded(), robot, 0.05)}
+        return list(check_rig(emulators.loaded(), robot, 0.05))
+
+
+def findings(robot, faults=None, **settings):
+    """The last line of every kind."""
+    return {found.what: found for found in lines(robot, faults, **settings)}
 
 
 @pytest.mark.parametrize("version", ["2.5", "2.7", "2.9"])
@@ -55,3 +62,36 @@ def test_a_second_source_of_frames_is_a_finding(tcr5x4):
     assert found["source"].exit_code == 4
     assert "second source" in found["source"].text
     assert "source" not in findings(tcr5x4)
+
+
+def rings_swapped(*rings):
+    return tuple(tuple(f"m{ring}.n{node}" for ring in rings) for node in (1, 2, 3))
+
+
+@pytest.mark.parametrize(
+    ("faults", "named"),
+    [
+        ({"swap": rings_swapped(2, 4)}, ("ring 2", "ring 4")),
+        ({"swap": (("m3.n1", "m3.n2"), ("m3.n2", "m3.n3"))}, ("ring 3",)),
+        ({"turned_deg": (0.0, 0.0, 20.0)}, ("turned about the vertical by 20 deg",)),
+        ({"mirrored": (1.0, 0.0, 0.0)}, ("mirrored",)),
+    ],
+    ids=["rings swapped", "labels turned", "frame turned", "frame mirrored"],
+)
+def test_a_picture_that_a_run_would_not_believe_is_a_finding_with_ring_or_frame(faults, named, tcr5x4):
+    told = [found for found in lines(tcr5x4, faults) if found.what == "picture"]
+    assert {found.exit_code for found in told} == {4}
+    said = " ".join(found.text for found in told)
+    assert all(name in said for name in named), said
+
+
+def test_a_right_picture_is_said_to_be_right(tcr5x4):
+    told = [found for found in lines(tcr5x4) if found.what == "picture"]
+    assert [found.exit_code for found in told] == [0]
+
+
+def test_a_picture_is_not_judged_while_nobody_knows_where_the_drives_are(tcr5x4, monkeypatch):
+    never = property(lambda program: False, lambda program, value: None)
+    monkeypatch.setattr(PlcProgram, "zeroed", never, raising=False)
+    told = [found for found in lines(tcr5x4, {"mirrored": (1.0, 0.0, 0.0)}) if found.what == "picture"]
+    assert [(found.exit_code, "not judged" in found.text) for found in told] == [(0, True)]

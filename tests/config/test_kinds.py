@@ -11,7 +11,7 @@ from tcrctl.estimator import estimator
 from tcrctl.estimator.settings import EstimatorSettings
 from tcrctl.experiment import prepare
 from tcrctl.plant.rig import modbus_drives
-from tcrctl.plant.rig.settings import MountedRobot
+from tcrctl.plant.rig.settings import Dynamixel, MountedRobot
 from tcrctl.plant.settings import PlantSettings
 from tcrctl.task import task
 from tcrctl.task.settings import TaskSettings
@@ -24,7 +24,10 @@ TABLES = {
     "estimator": (estimator.KINDS, EstimatorSettings),
     "plant": (prepare.PLANTS, PlantSettings),
     "task": (task.KINDS, TaskSettings),
-    "plc": (modbus_drives.LINKS, MountedRobot.model_fields["plc"].annotation),
+    "plc": (
+        {**modbus_drives.LINKS, "dynamixel": (Dynamixel, None)},
+        MountedRobot.model_fields["plc"].annotation,
+    ),
 }
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from tcrctl.controller.dither import Dither
+from tcrctl.controller.dither_settings import DitherSettings
 from tcrctl.controller.friction_probe import FrictionProbe, swing, triangle
 from tcrctl.experiment.prepare import build_parts, build_plant, prepare
 from tcrctl.experiment.spec import load_spec
@@ -50,6 +53,30 @@ def test_it_knows_nothing_before_two_waves_have_told(probe):
 def test_a_wave_that_is_too_small_and_an_end_that_is_not_seen_tell_nothing(probe, tcr700):
     assert told(probe, np.zeros((20, 3)), amplitude=1e-6) is None
     assert told(FrictionProbe(tcr700, HALF, PERIOD), np.full((20, 3), np.nan)) is None
+
+
+@pytest.mark.parametrize("half", [1, 2, 3, 4, 5, 10])
+def test_the_wave_that_is_reckoned_with_is_the_one_that_the_dither_makes(half, tcr700):
+    """Rates at which half a wave of 5 Hz is one period, an odd number of them, an even one."""
+    dither = Dither(DitherSettings(frequency_hz=5.0, least_mm=1.0), 0.1 / half, tcr700, 1.0)
+    made = np.cumsum(
+        [0.0 * dither.now.place, *(0.1 / half * dither.speed() for _ in range(6 * half))], axis=0
+    )
+    along = made @ np.sign(made[1]) / (np.abs(made[1]) > 0.0).sum()
+    np.testing.assert_allclose(along, 1e-3 * triangle(half, 6 * half + 1), atol=1e-12)
+
+
+@pytest.mark.parametrize(("period", "probed"), [(0.2, False), (0.1, False), (0.05, True), (0.03, True)])
+@pytest.mark.filterwarnings("error")
+def test_a_loop_that_is_too_slow_for_the_wave_says_that_it_does_not_know(period, probed, tcr700):
+    dither = Dither(DitherSettings(), period, tcr700, 0.05)
+    estimate = SimpleNamespace(position=np.zeros(3), drive=np.zeros(6))
+    for _ in range(40):
+        dither.observe(np.zeros(3), estimate, settling=True)
+        estimate.drive = estimate.drive + period * dither.speed()
+        estimate.position = 2.0 * np.array([estimate.drive[0], 0.0, 0.0])
+    assert (dither.thrown is not None) == probed
+    assert dither.slides <= probed
 
 
 def test_the_swing_of_a_wave_is_its_amplitude():

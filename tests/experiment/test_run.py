@@ -20,8 +20,9 @@ from tcrctl.analysis.info import inspect
 from tcrctl.cli.app import main
 from tcrctl.cli.run_table import rows
 from tcrctl.controller.shell import Shell
-from tcrctl.errors import DeviceError, DivergenceError, InputError, LogError
+from tcrctl.errors import ArmingRefusedError, DeviceError, DivergenceError, InputError, LogError
 from tcrctl.experiment.criterion import parse_criterion
+from tcrctl.experiment.first_look import START_READS
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.run_folder import make_run_folder
@@ -72,6 +73,28 @@ def test_the_summary_agrees_with_the_log(finished):
     assert summary.as_json() == json.loads(log.stop["summary"])
     assert log.stop["status"] == "success"
     assert json.loads((summary.log.parent / "summary.json").read_text()) == summary.as_json()
+
+
+class OnceLooked(SimulatedPlant):
+    """A bench whose drives are not switched on; says how often it was measured before."""
+
+    reads = 0
+
+    def read(self):
+        OnceLooked.reads += 1
+        return super().read()
+
+    def start(self):
+        raise ArmingRefusedError(["enough is seen"])
+
+
+def test_a_robot_is_looked_at_once_before_it_is_armed(short, tmp_path, monkeypatch):
+    bench = prepare(short_spec("plant={kind: rig, rig: loopback}"))
+    plant = OnceLooked(short.spec.plant, bench.robot, bench.period, 1)
+    monkeypatch.setattr("tcrctl.experiment.run.build_plant", lambda experiment, operation: (plant, None))
+    summary = run_experiment(bench, out=tmp_path)
+    assert (summary.exit_code, "enough is seen" in summary.reason) == (4, True)
+    assert OnceLooked.reads == START_READS
 
 
 def test_the_folder_holds_the_run_and_everything_to_repeat_it(short, finished):

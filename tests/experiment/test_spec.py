@@ -48,6 +48,29 @@ def test_shipped_experiments_are_valid_and_survive_both_file_formats(name: str) 
     assert strict_yaml.validate(strict_yaml.loads(text), ExperimentSpec) == found.spec
 
 
+BENCH = SPEC.replace("{kind: ioc}", "{kind: ioc, period_s: 0.1}").replace(
+    "{kind: simulated}", "{kind: rig, rig: loopback}"
+)
+
+
+def test_a_period_for_which_the_watchdog_is_too_short_is_refused_where_it_stands(tmp_path: Path) -> None:
+    (found,) = problems_of(tmp_path, text=BENCH)
+    assert found.startswith("/standing.yaml:4:25: controller.period_s: is 0.1 s; the watchdog of the PLC")
+    assert "at most 0.0667 s" in found
+    (found,) = problems_of(tmp_path, "plant={kind: rig, rig: loopback}", "controller.period_s=0.07")
+    assert found.startswith("--set controller.period_s: is 0.07 s")
+    assert loaded(tmp_path, "controller.period_s=0.0666", text=BENCH).rig is not None
+
+
+def test_a_rig_with_a_longer_watchdog_allows_a_longer_period_as_far_as_its_cameras_do(tmp_path: Path) -> None:
+    rig = shipped.find_rig("loopback").read_text()
+    (tmp_path / "slow.yaml").write_text(rig.replace("port: 15600}", "port: 15600, watchdog_ms: 3000}"))
+    text = BENCH.replace("rig: loopback", "rig: ./slow.yaml")
+    assert loaded(tmp_path, "controller.period_s=0.4", text=text).rig is not None
+    (found,) = problems_of(tmp_path, "controller.period_s=0.5", text=text)
+    assert "longer than safety.stale_stop_ms" in found
+
+
 @pytest.mark.parametrize("section", ["controller.tension", "controller.integral", "plant.mismatch"])
 def test_a_section_that_is_off_stays_off_in_the_resolved_file(tmp_path: Path, section: str) -> None:
     spec = loaded(tmp_path, f"{section}=off").spec

@@ -14,11 +14,15 @@ from tcrctl.loop.interruption import Interruption, signals_exit
 from tcrctl.loop.loop import Parts, run_loop, step_count, tick
 from tcrctl.loop.pacing import LONGEST_NAP, RealTime, Unpaced
 from tcrctl.loop.safety import SafetyGuard, SafetyLimits
+from tcrctl.picture.picture import Unjudged
 
 LIMITS = SafetyLimits(position_error=0.06, tension=60.0)
 
 
-def loop(plant=None, estimator=None, controller=None, *, pace=None, record=None, duration=1.0, limits=LIMITS):
+def loop(
+    plant=None, estimator=None, controller=None, *,
+    pace=None, record=None, duration=1.0, limits=LIMITS, picture=None,
+):  # fmt: skip
     """Run the loop with fakes where nothing else is given; returns the records, also of a loop that raised."""
     records = []
     error = None
@@ -34,6 +38,7 @@ def loop(plant=None, estimator=None, controller=None, *, pace=None, record=None,
                 pace=pace or Unpaced(),
                 guard=SafetyGuard(limits),
                 record=record or records.append,
+                picture=picture or Unjudged(),
             )
         )
     except StoppedError as stopped:
@@ -185,7 +190,7 @@ def test_the_sections_of_a_step_are_timed():
 
 def begins(clock, plant, steps=20, **options):
     """Times at which the steps begin, from the first one on, and how late each says it is."""
-    pace = RealTime(PERIOD, clock=clock, sleep=clock.sleep)
+    options.setdefault("pace", RealTime(PERIOD, clock=clock, sleep=clock.sleep))
     times = []
     read = plant.read
 
@@ -194,7 +199,7 @@ def begins(clock, plant, steps=20, **options):
         return read()
 
     plant.read = noted
-    records, _ = loop(plant, pace=pace, duration=steps * PERIOD, **options)
+    records, _ = loop(plant, duration=steps * PERIOD, **options)
     return np.array(times) - times[0], np.array([r.timing.lateness for r in records])
 
 
@@ -229,6 +234,24 @@ def test_missed_steps_are_not_made_up_for_in_a_burst():
     assert late[5] == pytest.approx(2.5 * PERIOD)
     assert np.diff(times).min() >= PERIOD * (1.0 - 1e-9)
     assert times[-1] == pytest.approx((19 + 5) * PERIOD)
+
+
+def test_what_waits_waits_by_the_clock_in_which_missed_steps_count():
+    clock, seen = Clock(), []
+    pace = RealTime(PERIOD, clock=clock, sleep=clock.sleep)
+    assert pace.elapsed() == 0.0
+
+    class Watched(Unjudged):
+        def judged(self, measured, elapsed):
+            seen.append(elapsed)
+            return measured
+
+    times, _ = begins(clock, FakePlant(clock, seconds=0.01, slow_steps={4, 9}), pace=pace, picture=Watched())
+    assert seen == pytest.approx(times)
+    assert seen[-1] == pytest.approx(pace.time() + 5 * PERIOD, abs=PERIOD)
+    seen.clear()
+    loop(picture=Watched())
+    assert seen == pytest.approx(PERIOD * np.arange(20))  # no clock paces it
 
 
 def test_steps_that_are_always_too_long_run_at_their_own_rate():

@@ -19,6 +19,10 @@ from support.pictures import (
     shifted,
     turned,
 )
+from tcrctl.picture.kernel import Shape
+from tcrctl.picture.limits import limits_in_motion
+from tcrctl.picture.settings import PictureSettings
+from tcrctl.picture.shares import joint_shares
 
 BEGIN = 200
 """Frame in which something goes wrong."""
@@ -205,6 +209,42 @@ def test_drives_that_were_held_for_a_moment_go_on():
     assert "the drives are not held any more" in [text for _, level, text in found.events if level == "info"]
 
 
+FIRST = BEGIN - STILL
+"""Step in which something goes wrong."""
+
+
+def stalled(after):
+    """Times of steps [s] if the process was stopped for 3 s after one of them."""
+    return lambda k: PERIOD * k + np.where(k > after, 3.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("begun", "held"),
+    [
+        (lambda k: PERIOD * k, 0.2),
+        (stalled(FIRST), 3.0 + PERIOD),
+        (stalled(FIRST - 1), 0.2),  # before there was a doubt
+        (lambda k: PERIOD * k + np.where(k > FIRST + 2, 0.06, 0.0), 0.21),  # one step took long
+        (lambda k: 2.0 * PERIOD * k, 0.2),  # every step does
+        (lambda k: PERIOD * k + 0.004 * np.sin(k), 0.2),  # steps begin a little early or late, that is all
+    ],
+)
+def test_a_run_is_stopped_by_the_time_for_which_the_drives_were_held_not_by_the_number_of_steps(begun, held):
+    made = wrong_from(lambda m: turned(m, 0, 0, 20))
+    times = begun(np.arange(len(made)))
+    found = judged(made, times)
+    assert times[found.stopped] - times[found.first] == pytest.approx(held, abs=0.01)
+
+
+@pytest.mark.parametrize("slow", [1.0, 2.0, 4.0])
+def test_what_comes_back_has_been_well_for_a_while_by_the_clock(slow):
+    made = frames(1)
+    made[BEGIN] = labels_moved(made[BEGIN], 5)
+    found = judged(made, slow * PERIOD * np.arange(len(made)))
+    ill, well = found.told
+    assert slow * PERIOD * (well - ill) == pytest.approx(1.0, abs=1.01 * slow * PERIOD)
+
+
 def test_a_blank_frame_is_nothing_to_judge():
     made = frames(1)
     for k in range(100, 160):
@@ -221,6 +261,24 @@ def test_a_ring_that_is_seen_for_the_first_time_in_motion_is_believed_as_it_is()
     assert judged(made).first is None
     drifted = [shifted(m, rows_of(6), (0.025 * max(0, k - 200), 0, 0)) for k, m in enumerate(made)]
     assert judged(drifted).names[0] == "ring 6"
+
+
+@pytest.mark.parametrize(("ring", "unseen"), [(10, 11), (7, 8), (7, 6), (2, 1)])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_joint_beside_one_that_is_not_seen_gives_no_more_along_the_body_than_a_joint_can(ring, unseen, way):
+    """As with two rings exchanged, once one of them is left out."""
+    offset = np.zeros((RINGS, 3))
+    offset[unseen - 1] = np.nan
+    offset[ring - 1, 2] = way
+
+    def share(millimetres):
+        change = Shape(
+            np.zeros((RINGS, 3)), 1e-3 * millimetres * offset, np.zeros(RINGS), np.zeros((RINGS, 2))
+        )
+        return joint_shares(change, limits_in_motion(PictureSettings()), 0.0).worst[ring - 1]
+
+    assert share(10.0) <= 1.0
+    assert share(49.6) > 1.0
 
 
 def test_rings_without_neighbours_are_judged_by_their_sizes():

@@ -9,6 +9,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from numpy.testing import assert_allclose
 from PIL import Image
 
@@ -22,8 +23,9 @@ from tcrctl.errors import InputError, UnknownNameError
 from tcrctl.experiment import provenance
 from tcrctl.experiment.run import log_geometry
 from tcrctl.experiment.spec import load_spec
+from tcrctl.log.drawing import Ball, Drawing
 from tcrctl.numerics.rotation import angle_between, angles_from_normal
-from tcrctl.plots import FIGURES, draw, save
+from tcrctl.plots import FIGURES, draw, plan, save
 from tcrctl.plots.look import Look
 from tcrctl.robot.robot import Robot
 
@@ -365,3 +367,32 @@ def test_runs_that_wanted_different_things_are_drawn_with_all_of_them(pose):
         assert [text for text in same if text.startswith("wanted") and "axis" not in text] == ["wanted"]
         wanted = [text for text in both if text.startswith("wanted, ") and "axis" not in text]
         assert wanted == [f"wanted, {pose[0].label}", "wanted, other"]
+
+
+def boxes(figure, panel):
+    """Where the words of a panel are on the picture."""
+    FigureCanvasAgg(figure).draw()
+    return {text.get_text(): text.get_window_extent() for text in panel.texts}
+
+
+def test_names_of_objects_that_cover_each_other_do_not(pose, monkeypatch):
+    place = pose[0].position[0]
+    balls = tuple(
+        Ball(name, place + np.array(at), 0.01)
+        for name, at in (("mouse", [0.0, 0, 0]), ("handkerchief", [8e-3, 0, 2e-3]))
+    )
+    monkeypatch.setattr(plan, "read_drawing", lambda log: Drawing((), balls, (), None))
+    figure = draw("task", pose[:1])
+    panel = figure.axes[0]
+    found = boxes(figure, panel)
+    assert set(found) == {"mouse", "handkerchief"}
+    assert not found["mouse"].overlaps(found["handkerchief"])
+    assert panel.get_legend_handles_labels()[1].count("object") == 1
+
+
+def test_the_numbers_of_a_comparison_stay_within_their_panels(several):
+    figure = draw("comparison", several)
+    for panel in figure.axes:
+        for box in boxes(figure, panel).values():
+            assert panel.bbox.x0 <= box.x0
+            assert box.x1 <= panel.bbox.x1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -65,12 +66,28 @@ def test_a_line_that_is_spoilt_in_the_middle_is_that_run_alone(tmp_path):
         assert store.get(row(2).address) == row(2)
 
 
-def test_the_last_row_of_an_address_counts_and_only_the_machines_fault_is_forgotten(tmp_path):
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"status": 5}, {"status": "fine"}, {"status": []}, {"address": [1]}, {"reason": None}, {"result": [1]},
+        {"result": None}, {"timing": 5}, {"path": []}, {"log": 5}, {"program": 5}, {"seconds": "x"}, {"more": 1},
+    ],
+)  # fmt: skip
+def test_a_row_with_values_of_other_types_is_no_row_and_its_run_is_done_again(changes, tmp_path):
+    good = json.loads(row(0).dumps())
+    (tmp_path / ROWS).write_text(json.dumps({**good, **changes}) + "\n" + row(1).dumps().decode())
+    with Store(tmp_path) as store:
+        assert (len(store), store.repaired) == (1, 1)
+        assert store.get(row(1).address) == row(1)
+
+
+def test_the_last_row_of_an_address_counts_and_only_what_has_no_result_is_forgotten(tmp_path):
     with Store(tmp_path) as store:
         store.add(Row("a", "timeout", "late"))
         store.add(Row("b", "aborted", "diverged"))
-        store.forget(["a", "b", "c"])
-        assert ("a" in store, "b" in store) == (False, True)
+        store.add(Row("d", "error", "disk full"))
+        store.forget(["a", "b", "c", "d"])
+        assert [name in store for name in "abd"] == [False, True, False]
         store.add(Row("a", "success", ""))
     with Store(tmp_path) as store:
         assert store.get("a").status == "success"

@@ -106,6 +106,44 @@ BAD = {
         {"cases": {"a": {}}, "compare": {"factor": "case", "against": "b"}}, "compare", "is no case",
     ),
     "an unknown key at the top": ({"sets": {}}, "sets", "unknown key"),
+    "an unknown key in what all runs have": ({"set": {"plant.nois_um": 1}}, "set", "did you mean noise_um"),
+    "an unknown key in a case": ({"cases": {"a": {"controler.kind": "ioc"}}}, "cases", "did you mean controller"),
+    "no key": ({"vary": {"": [1]}}, "vary", "must be a dotted key"),
+    "half a key": ({"vary": {"plant..noise_um": [1]}}, "vary", "must be a dotted key"),
+    "a key with a blank": ({"cases": {"a": {"plant.noise_um ": 1}}}, "cases", "must be a dotted key"),
+    "a value that is no list": ({"vary": {SOFT: 0.8}}, "vary", "must be a list"),
+    "text that is no list": ({"vary": {SOFT: "0.8"}}, "vary", "must be a list"),
+    "a range of one point": ({"vary": {SOFT: {"low": 1, "high": 1, "steps": 3}}}, "vary", "must be above low"),
+    "a range without a step": ({"vary": {SOFT: {"low": 1, "high": 2, "steps": 0}}}, "vary", "must be >= 2"),
+    "a range from nothing on, by its log": (
+        {"vary": {SOFT: {"low": 0, "high": 1, "steps": 3, "scale": "log"}}}, "vary", "must be > 0 with scale",
+    ),
+    "a distribution of one point": (
+        {"vary": {SOFT: {"mean": 1, "std": 0}}, "design": "random", "samples": 3}, "vary", "must be > 0",
+    ),
+    "an empty list of seeds": ({"seeds": []}, "seeds", "at least 1"),
+    "a key that all runs have and that varies": (
+        {"set": {"plant.noise_um": 1}, "vary": {"plant.noise_um": [1]}}, "set", "is varied too",
+    ),
+    "a key that a section replaces which varies": (
+        {"set": {SOFT: 0.8}, "vary": {"plant.mismatch": ["off"]}}, "set", "is replaced by plant.mismatch",
+    ),
+    "a key that a later section replaces": (
+        {"cases": {"a": {SOFT: 0.8, "plant.mismatch": "off"}}}, "cases", "is replaced by plant.mismatch",
+    ),
+    "the same value twice": ({"vary": {SOFT: [0.8, 1.0, 0.8]}}, "vary", "would count as two"),
+    "the same seed twice": ({"seeds": [3, 1, 3]}, "seeds", "seed 3 is given twice"),
+    "a billion seeds": ({"seeds": "0..999999999"}, "seeds", "this is 1000000000"),
+    "a billion samples": (
+        {"vary": {SOFT: {"low": 1, "high": 2}}, "design": "sobol", "samples": 10**9}, "samples", "<= 1000000",
+    ),
+    "a grid of more combinations than a number has bits": (
+        {"vary": {f"k{i}": [1, 2] for i in range(70)}}, "vary", f"{2**70} runs",
+    ),
+    "itself": ({"experiments": ["./quick.yaml"]}, "experiments", "is a study"),
+    "an identification in a study": ({"experiments": ["identify_table2"]}, "experiments", "is an identification"),
+    "no experiments": ({"experiments": []}, "experiments", "at least 1"),
+    "a study made by a key": ({"vary": {"kind": ["study"]}}, "vary", "unknown key"),
     "a rig": (
         {"set": {"plant": {"kind": "rig", "rig": "loopback"}}}, "experiments", "studies simulate",
     ),
@@ -126,6 +164,11 @@ def test_bad_input_is_one_located_message_and_exit_code_2(name, tmp_path, capsys
     assert message in line
     assert main(["sweep", str(path), "--out", str(tmp_path / "logs")]) == 2
     assert not (tmp_path / "logs").exists()
+
+
+def test_side_by_side_and_in_different_kinds_values_may_repeat():
+    assert points(vary={"a": [1, 1, 2], "b": [1, 2, 2]}, design="zip") == [(1, 1), (1, 2), (2, 2)]
+    assert points(vary={"a": [1, 1.0, True, "1"]}) == [(1,), (1.0,), (True,), ("1",)]
 
 
 def test_a_study_is_no_experiment_and_says_how_it_is_started(capsys):

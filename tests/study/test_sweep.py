@@ -22,11 +22,11 @@ from tcrctl.executors.engine import Engine
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.unrecorded import run_unrecorded
-from tcrctl.study.address import address
+from tcrctl.study.address import address, program
 from tcrctl.study.order import Order, do
 from tcrctl.study.outputs import findings
 from tcrctl.study.plan import planned
-from tcrctl.study.row import same_every_time
+from tcrctl.study.row import Row, same_every_time
 from tcrctl.study.store import ROWS
 from tcrctl.study.sweep import folder_of, sweep
 
@@ -133,18 +133,21 @@ def children(pid):
     return found
 
 
+RESULTS = {
+    "good": {},
+    "missed": {"criteria": ["position_error_mm.max <= 0.001"]},
+    "stopped": {"safety.position_error_mm": 0.01},
+    "too far": {"trajectory.plane.offset_mm": [0, 0, 600]},
+}
+
+
 def test_runs_that_fail_are_rows_with_their_reasons(tmp_path, capsys, monkeypatch):
     stay_here(monkeypatch)
-    cases = {
-        "good": {},
-        "missed": {"criteria": ["position_error_mm.max <= 0.001"]},
-        "stopped": {"safety.position_error_mm": 0.01},
-        "too far": {"trajectory.plane.offset_mm": [0, 0, 600]},
-        "late": {"trajectory.settle_s": 3000},
-    }
+    cases = {**RESULTS, "late": {"trajectory.settle_s": 3000}}
     path = study_file(tmp_path, cases=cases, timeout_s=4.0)
-    assert main(["sweep", str(path), "--out", str(tmp_path), "--jobs", "1", "--json"]) == 0
+    assert main(["sweep", str(path), "--out", str(tmp_path), "--jobs", "1", "--json"]) == 3
     made = json.loads(capsys.readouterr().out)
+    assert (made["status"], made["reason"]) == ("failed", "1 of 5 runs without a result: 1 timeout")
     assert (made["runs"], made["missing"]) == (5, 0)
     with open(made["table"]) as file:
         table = {line["case"]: line for line in csv.DictReader(file)}
@@ -159,6 +162,44 @@ def test_runs_that_fail_are_rows_with_their_reasons(tmp_path, capsys, monkeypatc
         logs = [line["log"] for line in csv.DictReader(file)]
     kept = [case for case, log in zip(cases, logs, strict=True) if log and Path(log).exists()]
     assert {"missed", "stopped"} <= {*kept} <= {"missed", "stopped", "late"}  # of those that had begun
+
+
+def fallen(monkeypatch, row):
+    """Every run ends like this row."""
+    monkeypatch.setattr("tcrctl.study.sweep.do", lambda order: replace(row, address=order.address))
+
+
+def sweeping(path, out, capsys, *more):
+    """Exit code, and what is printed as JSON and on stderr."""
+    code = main(["sweep", str(path), "--out", str(out), "--jobs", "1", "--json", *more])
+    printed = capsys.readouterr()
+    return code, json.loads(printed.out), printed.err
+
+
+@pytest.mark.parametrize("status", ["crashed", "timeout", "error"])
+def test_a_study_whose_runs_have_no_result_says_so_until_they_have(status, tmp_path, capsys, monkeypatch):
+    stay_here(monkeypatch)
+    path = study_file(tmp_path, seeds=[0, 1])
+    with monkeypatch.context() as once:
+        fallen(once, Row("", status, "why", program=program()))
+        for _ in range(2):  # the second time it is in the store
+            code, made, said = sweeping(path, tmp_path, capsys)
+            assert (code, made["status"], made["missing"]) == (3, "failed", 0)
+            assert made["reason"] == f"2 of 2 runs without a result: 2 {status}"
+            assert "error: 2 of 2 runs" in said
+            assert "--retry" in said
+    assert made["reason"] in (tmp_path / "quick.study" / "report.html").read_text()
+    code, made, said = sweeping(path, tmp_path, capsys, "--retry")
+    assert (code, made["status"], made["reason"], made["new"]) == (0, "success", "", 2)
+    assert "error" not in said
+
+
+def test_missed_criteria_limits_and_refused_paths_are_results(tmp_path, capsys, monkeypatch):
+    stay_here(monkeypatch)
+    shapeless = {"plant.mismatch.springs_youngs_modulus": 1e-3}
+    path = study_file(tmp_path, cases={**RESULTS, "shapeless": shapeless})
+    code, made, _ = sweeping(path, tmp_path, capsys)
+    assert (code, made["status"], made["reason"]) == (0, "success", "")
 
 
 def test_a_dry_run_prints_the_runs_and_touches_nothing(tmp_path, capsys):

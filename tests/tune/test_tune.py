@@ -14,6 +14,7 @@ from support.studies import quick_study, study_file
 from tcrctl.cli.app import main
 from tcrctl.errors import SpecError
 from tcrctl.experiment.spec import load_spec
+from tcrctl.study.address import program
 from tcrctl.study.axes import RangeSettings
 from tcrctl.study.design import Cell
 from tcrctl.study.plan import PlannedRun
@@ -118,6 +119,25 @@ def test_a_bad_setting_is_found_out_and_the_file_that_is_written_is_better(tmp_p
     assert main([*order, "--out", str(tmp_path)]) == 0  # all its runs are in the store
     again = json.loads(capsys.readouterr().out)
     assert again == made
+
+
+@pytest.mark.parametrize("lost", ["shipped", "tuned"])
+def test_runs_without_a_result_are_no_proof_that_settings_are_better(lost, tmp_path, capsys, monkeypatch):
+    stay_here(monkeypatch)
+
+    def pretended(order):
+        tuned = order.loaded.spec.controller.weights.speed_change < 100.0
+        fallen = order.seed == 1 and tuned == (lost == "tuned")
+        result = {} if fallen else {"position_error_mm": {"max": 0.5 if tuned else 1.0}}
+        return Row(order.address, "crashed" if fallen else "success", "", result, program=program())
+
+    monkeypatch.setattr("tcrctl.study.sweep.do", pretended)
+    path = study_file(tmp_path, seeds=[0], vary={WEIGHT: {"low": 1, "high": 90, "steps": 2}})
+    order = ["tune", str(path), "--generations", "1", "--population", "3", "--jobs", "1"]
+    assert main([*order, "--json", "--quiet", "--out", str(tmp_path)]) == 3
+    made = json.loads(capsys.readouterr().out)
+    assert (made["status"], made["better"], made["files"]) == ("failed", False, [])
+    assert made["reason"] == "1 of 3 runs without a result: 1 crashed"
 
 
 def test_a_plant_is_never_its_own_judge(tmp_path, capsys):

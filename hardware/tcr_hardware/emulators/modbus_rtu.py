@@ -46,7 +46,7 @@ class RtuPort:
         """
         self._server, self._baud = server, baud
         self._stopped = threading.Event()
-        self._descriptors = _pseudo_terminal() if device is None else (_open(device),)
+        self._descriptors = pseudo_terminal() if device is None else (_open(device),)
         self.device = os.ttyname(self._descriptors[-1]) if device is None else device
         self._thread = threading.Thread(target=self._serve, name="plc-rtu", daemon=True)
         self._thread.start()
@@ -128,8 +128,12 @@ def _terminals() -> tuple[Callable[[int], Any], type[Exception]]:
     return tty.setraw, termios.error
 
 
-def _pseudo_terminal() -> tuple[int, int]:
-    """Open a raw pseudo-terminal; return our end and the client's, kept open so that clients may come and go."""
+def pseudo_terminal() -> tuple[int, int]:
+    """Open a raw pseudo-terminal; return our end and the client's, kept open so that clients may come and go.
+
+    Raises:
+        HardwareError: There are none on this system.
+    """
     make_raw, _ = _terminals()
     ours, theirs = os.openpty()
     make_raw(theirs)

@@ -31,8 +31,8 @@ def check(
       tcrctl rig check my_bench.yaml --robot tcr700 --period-s 0.01 --json
     """
     from tcrctl.commissioning.choice import choose_all
-    from tcrctl.commissioning.finding import Finding, worst
     from tcrctl.loop.interruption import signals_exit
+    from tcrctl.plant.rig.finding import Finding, worst
 
     lines: list[tuple[str, Finding]] = []
     with signals_exit():

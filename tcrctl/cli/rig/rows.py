@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tcrctl.commissioning.finding import Finding
+    from tcrctl.plant.rig.finding import Finding
     from tcrctl.robot.description import RobotDescription
 
 

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from tcrctl.errors import InputError
-from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.devices import Cameras, Drives
+from tcrctl.plant.rig.file import LoadedRig, period_misfits
 from tcrctl.plant.rig.health import Rules
+from tcrctl.plant.rig.mounting import CableAxis, Mounting, cable_axes, mounting
 from tcrctl.plant.rig.operation import Operation
+from tcrctl.plant.rig.own_cameras import OwnCameras
+from tcrctl.plant.rig.own_drives import OwnDrives
+from tcrctl.plant.rig.own_limits import check_drives
 from tcrctl.plant.rig.plant import RigLimits, RigPlant
 from tcrctl.plant.rig.set_points import AntagonistGroup, DriveEnvelope
-from tcrctl.plant.rig.settings import MountedRobot, SafetyRules
+from tcrctl.plant.rig.settings import Dynamixel, MountedRobot, SafetyRules
+from tcrctl.plugins.plugin import plugin_of
 from tcrctl.robot.module import ring_rows
 from tcrctl.robot.robot import Robot
-
-if TYPE_CHECKING:
-    from tcrctl.plant.rig.modbus_drives import ModbusDrives
-    from tcrctl.plant.rig.natnet_cameras import NatNetCameras
 
 
 def envelope(mounted: MountedRobot, rules: SafetyRules, names: tuple[str, ...]) -> DriveEnvelope:
@@ -61,29 +61,57 @@ def supervisor_rules(rules: SafetyRules) -> Rules:
     )
 
 
-def connect_cameras(loaded: LoadedRig, robot: Robot) -> NatNetCameras:
+def connect_cameras(loaded: LoadedRig, wanted: Mounting) -> Cameras:
     """Connect to the cameras of a rig.
+
+    Args:
+        loaded: The rig file.
+        wanted: Markers to look for.
 
     Raises:
         DeviceError: If they do not answer.
-        InputError: If they do not know the markers that the rig file names.
+        InputError: If they do not know the markers that the rig file names, or are a plug-in that cannot be built.
     """
+    settings = loaded.rig.cameras
+    plugin = plugin_of(settings)
+    if plugin is not None:
+        return OwnCameras(settings, plugin, wanted)
     from tcrctl.plant.rig.natnet_cameras import NatNetCameras
 
-    mounted = loaded.mounted
-    return NatNetCameras(loaded.rig.cameras, mounted.markers, mounted.calibration, robot)
+    return NatNetCameras(settings, wanted)
 
 
-def connect_drives(loaded: LoadedRig, names: tuple[str, ...]) -> ModbusDrives:
+def connect_drives(loaded: LoadedRig, names: tuple[str, ...]) -> Drives:
     """Connect to the drives of a rig; nothing is written.
 
+    Args:
+        loaded: The rig file.
+        names: Cables in the order of the drives.
+
     Raises:
-        DeviceError: If the PLC does not answer.
-        InputError: If it is not what the rig file says.
+        DeviceError: If they do not answer.
+        InputError: If they are not what the rig file says, or are a plug-in that cannot be built.
     """
+    settings, cables = loaded.mounted.plc, cable_axes(loaded.mounted, names)
+    plugin = plugin_of(settings)
+    if plugin is not None:
+        return OwnDrives(settings, plugin, cables)
+    if isinstance(settings, Dynamixel):
+        return _dynamixel(settings, cables)
     from tcrctl.plant.rig.modbus_drives import ModbusDrives
 
-    return ModbusDrives(loaded.mounted, names)
+    return ModbusDrives(settings, cables)
+
+
+def _dynamixel(settings: Dynamixel, cables: tuple[CableAxis, ...]) -> Drives:
+    try:
+        from tcrctl.plant.rig.dynamixel_drives import DynamixelDrives
+    except ModuleNotFoundError as error:
+        if error.name != "dynamixel_sdk":
+            raise
+        hint = "Install it: pip install 'tcrctl[dynamixel]'."
+        raise InputError("plc.kind: dynamixel needs the package dynamixel-sdk", hint=hint) from error
+    return DynamixelDrives(settings, cables)
 
 
 def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operation) -> RigPlant:
@@ -98,14 +126,17 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operati
     Raises:
         DeviceError: If cameras or drives do not answer.
         InputError: If they are not what the rig file says, or the period is impossible.
+        ArmingRefusedError: If the drives have no watchdog.
     """
     rules = loaded.rig.safety
-    _check_period(rules, period)
-    cameras = connect_cameras(loaded, robot)
+    for text in period_misfits(loaded, period):
+        raise InputError(f"controller.period_s {text}")
+    wanted, names = mounting(loaded.mounted, robot), robot.cable_names
+    cameras = connect_cameras(loaded, wanted)
     try:
-        drives = connect_drives(loaded, robot.cable_names)
+        drives = connect_drives(loaded, names)
         try:
-            drives.check(rules, period)
+            check_drives(drives, cable_axes(loaded.mounted, names), rules, period)
         except BaseException:
             drives.close()
             raise
@@ -113,20 +144,11 @@ def build_rig(loaded: LoadedRig, robot: Robot, period: float, operation: Operati
         cameras.close()
         raise
     limits = RigLimits(
-        envelope=envelope(loaded.mounted, rules, robot.cable_names),
+        envelope=envelope(loaded.mounted, rules, names),
         rules=supervisor_rules(rules),
         min_seen=rules.min_seen_fraction,
-        mapped=cameras.mapped,
+        mapped=len(wanted.markers),
         nodes=len(ring_rows(robot.n_modules)),
         arm_timeout=rules.arm_timeout_s,
     )
     return RigPlant(cameras, drives, limits, period, operation)
-
-
-def _check_period(rules: SafetyRules, period: float) -> None:
-    """Check that ticks come often enough to notice in time that the cameras have stopped."""
-    if 1e3 * period > rules.stale_stop_ms:
-        raise InputError(
-            f"controller.period_s {period:g} s is longer than safety.stale_stop_ms of the rig, "
-            f"{rules.stale_stop_ms:g} ms"
-        )

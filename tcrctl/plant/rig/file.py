@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tcr_hardware.modbus.wire_time import WATCHDOG_PERIODS
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.strict_yaml import Document
-from tcrctl.errors import InputError
+from tcrctl.errors import InputError, TcrctlError
+from tcrctl.log.file_names import PLUGINS, RIG
+from tcrctl.plant.rig.plugged import device_origins, with_devices
 from tcrctl.plant.rig.settings import MountedRobot, RigFile
+from tcrctl.plugins.faults import told
+from tcrctl.plugins.origin import Origin
+from tcrctl.plugins.trust import Trust
 from tcrctl.robot.description import RobotDescription, cable_routes
 from tcrctl.robot.module import is_ring_node, module_of, node_index
 
@@ -36,6 +43,11 @@ class LoadedRig:
         """What the file says about the robot."""
         return self.rig.robots[self.robot]
 
+    @property
+    def origins(self) -> tuple[Origin, ...]:
+        """Where its cameras and drives come from, as far as they are not built in."""
+        return device_origins(self.rig, self.robot)
+
 
 def read_rig(name_or_path: str, folder: Path | None = None) -> tuple[RigFile, Path, bytes, Document]:
     """Read a rig file.
@@ -52,7 +64,22 @@ def read_rig(name_or_path: str, folder: Path | None = None) -> tuple[RigFile, Pa
     path = shipped.find_rig(name_or_path, folder)
     given = strict_yaml.read(path)
     document = strict_yaml.loads(given, str(path))
-    return strict_yaml.validate(document, RigFile), path, given, document
+    model = with_devices(document, _trust_of(path))
+    return _validated(document, model), path, given, document
+
+
+def _trust_of(path: Path) -> Trust:
+    """Return where the files of kinds are: in the folder of a run beside the rig file, all of them."""
+    return Trust(path.parent, by_name=path.name == RIG and (path.parent / PLUGINS).is_file())
+
+
+def _validated(document: Document, model: type[RigFile]) -> RigFile:
+    try:
+        return strict_yaml.validate(document, model)
+    except TcrctlError:
+        raise
+    except Exception as error:  # a validator from elsewhere raised what none may
+        raise InputError(f"{document.name}: its settings could not be checked: {told(error, '')}") from error
 
 
 def load_rig(name_or_path: str, robot: RobotDescription, folder: Path | None = None) -> LoadedRig:
@@ -73,6 +100,26 @@ def load_rig(name_or_path: str, robot: RobotDescription, folder: Path | None = N
         raise InputError(f"{path}: robot {robot.name} does not hang on rig {rig.name}; there hang: {there}")
     document.refuse(_misfits(rig.robots[robot.name], robot))
     return LoadedRig(rig, robot.name, path, given)
+
+
+def period_misfits(loaded: LoadedRig, period: float) -> Iterator[str]:
+    """Yield why a rig cannot be run with a control period [s], as far as its file tells.
+
+    Ticks must come often enough to notice in time that the cameras have stopped, and to feed the PLC's watchdog
+    even if some of them are late. What the PLC itself says is looked at when it is connected.
+    """
+    period_ms, stale = 1e3 * period, loaded.rig.safety.stale_stop_ms
+    watchdog = getattr(
+        loaded.mounted.plc, "watchdog_ms", math.inf
+    )  # drives of one's own tell it when connected
+    if period_ms > stale:
+        yield f"is {period:g} s, longer than safety.stale_stop_ms of {loaded.path}, {stale:g} ms"
+    if WATCHDOG_PERIODS * period_ms > watchdog:
+        longest = 1e-3 * watchdog / WATCHDOG_PERIODS
+        yield (
+            f"is {period:g} s; the watchdog of the PLC has to be at least {WATCHDOG_PERIODS} periods, and "
+            f"plc.watchdog_ms of {loaded.path} is {watchdog:g} ms: at most {longest:.3g} s"
+        )
 
 
 def _misfits(mounted: MountedRobot, robot: RobotDescription) -> Iterator[Finding]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+import time
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -23,23 +24,22 @@ from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status, re
 from tcr_hardware.modbus.settings import BusSettings, RtuLink, TcpLink
 from tcrctl.config.settings import Settings
 from tcrctl.errors import ArmingRefusedError, DeviceError, InputError, UntrustworthyDeviceError
-from tcrctl.plant.rig.devices import DriveControl, DriveStatus
+from tcrctl.plant.rig.devices import DeviceLimits, DriveControl, DriveStatus, Identity
+from tcrctl.plant.rig.finding import Finding
 from tcrctl.plant.rig.loopback import emulate_hint
-from tcrctl.plant.rig.settings import CableDrive, ModbusRtu, ModbusTcp, MountedRobot, SafetyRules
+from tcrctl.plant.rig.mounting import CableAxis
+from tcrctl.plant.rig.settings import ModbusRtu, ModbusTcp
 
 _WRONG_FILE: Final = (MapError, PlcMismatchError, RateError)
 _HOPELESS: Final = (ImplausibleAnswerError, PlcFrozenError)
-
-
-def address(mounted: MountedRobot) -> str:
-    """Return where the PLC is, for messages."""
-    return f"PLC at {mounted.plc.place}"
 
 
 #: A PLC that acknowledges a block this far from ours acknowledges one of somebody else.
 FOREIGN: Final = 0x100
 #: So many calls in a row with answers that were not for us: no late answer of a serial line.
 STRANGE: Final = 3
+#: What an exchange over a serial line has said is the status for so long [s]; a loop is faster, or has time to ask.
+RECENT: Final = 0.1
 #: Section and link of every ``plc.kind``.
 LINKS: Final[Mapping[str, tuple[type[Settings], Callable[[Any], TcpLink | RtuLink]]]] = {
     "modbus_tcp": (ModbusTcp, lambda plc: TcpLink(plc.host, plc.port)),
@@ -47,13 +47,15 @@ LINKS: Final[Mapping[str, tuple[type[Settings], Callable[[Any], TcpLink | RtuLin
 }
 
 
-def bus_settings(mounted: MountedRobot) -> BusSettings:
+def bus_settings(plc: ModbusTcp | ModbusRtu) -> BusSettings:
     """Return the settings of a bus.
+
+    Args:
+        plc: Section of the rig file.
 
     Raises:
         InputError: If the register map of the rig file is impossible.
     """
-    plc = mounted.plc
     _, link_to = LINKS[plc.kind]
     try:
         registers = register_map(changes=plc.map)
@@ -78,24 +80,23 @@ class ModbusDrives:
         bus: The connection.
     """
 
-    def __init__(self, mounted: MountedRobot, names: tuple[str, ...]) -> None:
+    def __init__(self, plc: ModbusTcp | ModbusRtu, cables: tuple[CableAxis, ...]) -> None:
         """Connect and read what the PLC is; nothing is written.
 
         Args:
-            mounted: Section of the rig file.
-            names: Cables in the order of the drives.
+            plc: Section of the rig file.
+            cables: Its cables in the order of the drives.
 
         Raises:
             DeviceError: If the PLC does not answer.
             InputError: If it is not what the rig file says.
         """
-        self._where, self._names = address(mounted), names
-        self._cables = [mounted.cables[name] for name in names]
-        self._axes = np.array([cable.axis - 1 for cable in self._cables])
-        self._signs = np.array([cable.sign for cable in self._cables], dtype=np.int64)
-        self._speed = math.ceil(1e3 * max(cable.speed_limit_mm_s for cable in self._cables) / 100.0) * 100
-        self._asks = mounted.plc.prompt
-        self.bus = PlcBus(bus_settings(mounted))
+        self._where, self._cables = f"PLC at {plc.place}", cables
+        self._axes = np.array([cable.axis - 1 for cable in cables])
+        self._signs = np.array([cable.sign for cable in cables], dtype=np.int64)
+        self._speed = math.ceil(max(cable.speed for cable in cables) / 100.0) * 100
+        self._asks, self._told_ms = plc.prompt, plc.watchdog_ms
+        self.bus = PlcBus(bus_settings(plc))
         try:
             self._call(self.bus.open)
             most = self.bus.info.limits
@@ -106,43 +107,45 @@ class ModbusDrives:
             self.bus.close()
             raise
         self._last: DriveStatus | None = None
+        self._exchanged = -math.inf
         self._mine: bool | None = None  # not known before the first exchange
         self._strange = self._stale = 0
 
-    def check(self, rules: SafetyRules, period: float) -> float:
-        """Hold the rig file against the PLC's own limits; return the share of the period that the line is busy.
+    @property
+    def identity(self) -> Identity:
+        """What the PLC said when the connection was opened."""
+        info = self.bus.info
+        told = {
+            "map version": str(info.map_version),
+            "words": info.word_order,
+            "watchdog": f"{info.limits.watchdog_ms} ms",
+        }
+        return Identity("PLC", self._where, ", ".join(f"{key} {value}" for key, value in told.items()), told)
 
-        Args:
-            rules: Safety section of the rig file.
-            period: Time between two exchanges [s].
+    @property
+    def limits(self) -> DeviceLimits:
+        """The PLC's limits, turned round for axes that count the other way."""
+        limits = self.bus.info.limits
+        ends = np.array([limits.min_um, limits.max_um], float)[:, self._axes] * self._signs
+        return DeviceLimits(ends.min(axis=0), ends.max(axis=0), limits.vmax_um_s, limits.step_max_um)
+
+    @property
+    def watchdog(self) -> float | None:
+        """That of the PLC's program [s]."""
+        return 1e-3 * self.bus.info.limits.watchdog_ms
+
+    def load(self, period: float) -> float:
+        """Return the share of a control period [s] that the line is busy; 0 for TCP.
 
         Raises:
-            InputError: With everything that the PLC would not allow.
+            InputError: If the period is too short for the line, or for the watchdog.
         """
-        wrong = list(self._excesses(rules))
-        if wrong:
-            text = "; ".join(wrong)
-            raise InputError(f"the rig file allows more than the {self._where}: {text}")
         return float(self._call(lambda: self.bus.check_period(period)))
 
-    def _excesses(self, rules: SafetyRules) -> Iterator[str]:
-        limits = self.bus.info.limits
-        for name, cable in zip(self._names, self._cables, strict=True):
-            low, high = _axis_range(cable)
-            least, most = limits.min_um[cable.axis - 1], limits.max_um[cable.axis - 1]
-            if low < least or high > most:
-                yield (
-                    f"cable {name}: {low / 1e3:g} to {high / 1e3:g} mm on axis {cable.axis}, "
-                    f"PLC {least / 1e3:g} to {most / 1e3:g} mm"
-                )
-        if self._speed > limits.vmax_um_s:
-            yield f"speed {self._speed / 1e3:g} mm/s, PLC {limits.vmax_um_s / 1e3:g} mm/s"
-        if 1e3 * rules.max_step_mm > limits.step_max_um:
-            yield f"max_step_mm {rules.max_step_mm:g} mm, PLC {limits.step_max_um / 1e3:g} mm"
-
     def status(self) -> DriveStatus:
-        """Read the status; over a serial line, where that costs wire time, what the last exchange said."""
-        if self._last is not None and not self._asks:
+        """Read the status; over a serial line, where that costs wire time, what an exchange has said just now."""
+        recent = time.monotonic() - self._exchanged < RECENT
+        if self._last is not None and recent and not self._asks:
             return self._last
         return self._translated(self._asked(self.bus.read_status))
 
@@ -164,7 +167,7 @@ class ModbusDrives:
             block[axis] = int(value)
         bits = _bits(control)
         answer = self._asked(lambda: self.bus.exchange(block, bits, self._speed))
-        self._last = self._translated(answer)
+        self._last, self._exchanged = self._translated(answer), time.monotonic()
         return self._last
 
     def _asked(self, action: Callable[[], Any]) -> Any:
@@ -189,6 +192,15 @@ class ModbusDrives:
             self._mine = False
             raise
         self._mine = True
+
+    def checks(self) -> tuple[Finding, ...]:
+        """Say where the watchdog is another one than the rig file's; the rest was looked at on opening."""
+        watchdog = self.bus.info.limits.watchdog_ms
+        if watchdog == self._told_ms:
+            return ()
+        return (
+            Finding("watchdog", f"{watchdog} ms; plc.watchdog_ms of the rig file is {self._told_ms:g} ms"),
+        )
 
     def close(self) -> None:
         """End the connection."""
@@ -235,14 +247,8 @@ class ModbusDrives:
 
     def _reason(self, answer: Any) -> str:
         text = answer.reject.name.lower().replace("_", " ")
-        axes = {cable.axis: name for name, cable in zip(self._names, self._cables, strict=True)}
+        axes = {cable.axis: cable.name for cable in self._cables}
         return f"{text}, cable {axes.get(answer.reject_axis, f'of axis {answer.reject_axis}')}"
-
-
-def _axis_range(cable: CableDrive) -> tuple[int, int]:
-    """Return the soft limits as the axis counts them [um]."""
-    ends = (round(1e3 * cable.sign * cable.min_mm), round(1e3 * cable.sign * cable.max_mm))
-    return min(ends), max(ends)
 
 
 def _bits(control: DriveControl) -> Control:

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tcr_hardware.errors import HardwareError
-from tcr_hardware.markers import Gate, MarkerMap, MarkerMapError, NodeMarker
+from tcr_hardware.markers import Gate, MarkerMap, MarkerMapError
 from tcr_hardware.natnet.client import NatNetClient
 from tcr_hardware.natnet.marker_frame import MarkerFrame
 from tcr_hardware.natnet.settings import NatNetSettings
-from tcr_hardware.rigid_transform import RigidTransform
-from tcrctl.errors import DeviceError, InputError
-from tcrctl.plant.rig.devices import Sighting
+from tcrctl.errors import ArmingRefusedError, DeviceError, InputError
+from tcrctl.plant.rig.devices import CameraStatus, Identity, Sighting
+from tcrctl.plant.rig.finding import Finding
 from tcrctl.plant.rig.loopback import emulate_hint
-from tcrctl.plant.rig.settings import Calibration, CameraSettings, MarkerSettings
-from tcrctl.robot.module import node_index, ring_rows
-from tcrctl.robot.robot import Robot
+from tcrctl.plant.rig.mounting import Mounting
+from tcrctl.plant.rig.settings import CameraSettings
 from tcrctl.signals import RawFrame
+
+#: Older servers do not tell when a frame was taken.
+OLDEST_WITH_CLOCK: Final = (3, 0)
 
 
 @contextmanager
@@ -48,30 +49,6 @@ def client_settings(cameras: CameraSettings) -> NatNetSettings:
     )
 
 
-def transform(calibration: Calibration) -> RigidTransform:
-    """Return the way from the cameras' frame to that of the robot."""
-    return RigidTransform.from_dict(calibration.model_dump())
-
-
-def node_markers(markers: MarkerSettings, n_modules: int) -> list[NodeMarker]:
-    """Return which marker sits on which ring node, in the order of the nodes.
-
-    Args:
-        markers: Section of the rig file.
-        n_modules: Number of free modules.
-    """
-    rings = range(1, n_modules + 1) if markers.rings == "all" else markers.rings
-    found: dict[str, NodeMarker] = {}
-    if markers.labels is not None:
-        for ring in rings:
-            for node in (1, 2, 3):
-                name = f"m{ring}.n{node}"
-                found[name] = NodeMarker(name, label=markers.labels.format(ring=ring, node=node))
-    for entry in markers.nodes:
-        found[entry.node] = NodeMarker(entry.node, entry.label, entry.asset, entry.member)
-    return [found[name] for name in sorted(found, key=node_index)]
-
-
 def connect(cameras: CameraSettings) -> NatNetClient:
     """Open a client.
 
@@ -94,34 +71,52 @@ class NatNetCameras:
     Attributes:
         client: The connection.
         rate: Frames per second [Hz].
-        mapped: Number of nodes that carry a marker.
     """
 
-    def __init__(
-        self, cameras: CameraSettings, markers: MarkerSettings, calibration: Calibration, robot: Robot
-    ) -> None:
+    def __init__(self, cameras: CameraSettings, mounting: Mounting) -> None:
         """Connect.
+
+        Args:
+            cameras: Section of the rig file.
+            mounting: What is looked for.
 
         Raises:
             DeviceError: If the camera system does not answer.
             InputError: If a label is not known there.
         """
         self.client = connect(cameras)
-        self._settings = cameras
+        self._settings, self._mounting = cameras, mounting
         self._last = None
         self._bits = b""
         try:
             with device_errors(f"cameras at {cameras.server}"):
                 self.rate = cameras.rate_hz or self.client.frame_rate()
-                self._map, self._rows = _marker_map(cameras, markers, calibration, robot)
+                self._map = _marker_map(cameras, mounting)
                 self._check_labels()
-            self._n_nodes = len(ring_rows(robot.n_modules))
         except BaseException:
             self.client.close()
             raise
-        self.mapped = len(self._rows)
 
     _last: MarkerFrame | None
+
+    @property
+    def identity(self) -> Identity:
+        """The program that streams, and the version that it speaks."""
+        server, version = self.client.server, str(self.client.version)
+        application = "" if server is None else server.application
+        return Identity(
+            "cameras",
+            f"cameras at {self._settings.server}",
+            f"{application}, NatNet {version}" if application else "",
+            {"server": application, "natnet": version},
+        )
+
+    @property
+    def clock(self) -> str:
+        """Frames before 3.0 do not say when they were taken."""
+        version = self.client.version
+        old = version is not None and version < OLDEST_WITH_CLOCK
+        return f"not told by NatNet {version}" if old else ""
 
     def next(self, timeout: float, *, fresh: bool) -> Sighting | None:
         """Return the newest frame not returned before; one that repeats the last bit for bit is none.
@@ -150,6 +145,8 @@ class NatNetCameras:
         return new
 
     def _check_labels(self) -> None:
+        if not any(marker.label for marker in self._mounting.markers):
+            return
         # A server that tells anew what it tracks has forgotten it for a moment: no reason to go without the check.
         models = self.client.wait_models()
         try:
@@ -158,14 +155,7 @@ class NatNetCameras:
             raise InputError(f"the rig file names markers in vain: {error}", hint=error.hint) from error
 
     def _mapped(self, frame: MarkerFrame) -> Sighting:
-        located = self._map.locate(frame)
-        nodes = np.zeros((self._n_nodes, 3), np.float32)
-        valid = np.zeros(self._n_nodes, np.bool_)
-        nodes[self._rows[located.valid]] = located.positions[located.valid]
-        valid[self._rows] = located.valid
-        doubts = Counter(reason for reason in located.reasons if reason)
-        text = ", ".join(f"{count} {reason}" for reason, count in sorted(doubts.items()))
-        return Sighting(frame.taken_at, nodes, valid, text, self._raw(frame))
+        return self._mounting.sighting(self._map.locate(frame), frame.taken_at, self._raw(frame))
 
     def _raw(self, frame: MarkerFrame) -> RawFrame:
         markers = frame.data.markers if self._settings.log_raw else frame.data.markers[:0]
@@ -178,24 +168,32 @@ class NatNetCameras:
             flags=markers["params"].astype(np.int32),
         )
 
+    def status(self) -> CameraStatus:
+        """Return what the client has counted."""
+        counts, newest = self.client.statistics(), self.client.newest()
+        markers = 0 if newest is None else len(newest.data.markers)
+        return CameraStatus(counts.lost, counts.malformed, counts.impossible, markers)
+
+    def checks(self, seen: Sequence[Sighting]) -> Iterator[Finding]:
+        """Yield whether somebody else sends frames, too."""
+        del seen
+        counts = self.client.statistics()
+        if counts.strangers:
+            text = f"frames of a second source: {counts.strangers}; {counts.last_problem}"
+            yield Finding("source", text, ArmingRefusedError.exit_code)
+
     def close(self) -> None:
         """End the connection."""
         self.client.close()
 
 
-def _marker_map(
-    cameras: CameraSettings, markers: MarkerSettings, calibration: Calibration, robot: Robot
-) -> tuple[MarkerMap, NDArray[np.int64]]:
-    """Return the map, and for each of its markers the row in ``Measurement.nodes``."""
-    wanted = node_markers(markers, robot.n_modules)
-    row_of = {row: i for i, row in enumerate(ring_rows(robot.n_modules))}
-    nodes = [node_index(marker.node) for marker in wanted]
+def _marker_map(cameras: CameraSettings, mounting: Mounting) -> MarkerMap:
     residual, widest = cameras.max_residual_mm, cameras.jump_gate_mm / 1e3
-    made = MarkerMap(
-        wanted,
-        robot.rest.q.reshape(-1, 3)[nodes],
-        transform(calibration),
-        gate=Gate(smallest_m=min(Gate().smallest_m, widest), largest_m=widest),
+    gate = Gate(smallest_m=min(Gate().smallest_m, widest), largest_m=widest)
+    return MarkerMap(
+        mounting.markers,
+        mounting.rest,
+        mounting.transform,
+        gate=gate if mounting.gated else Gate(np.inf, np.inf, np.inf),
         max_residual_m=np.inf if residual is None else residual / 1e3,
     )
-    return made, np.array([row_of[node] for node in nodes], dtype=np.int64)

@@ -17,7 +17,22 @@ Port: TypeAlias = Annotated[int, Field(ge=1, le=65535)]
 Host: TypeAlias = Annotated[str, Field(min_length=1, description="host name or address")]
 
 
-class CameraSettings(Settings):
+class CameraSection(Settings):
+    """What every ``cameras:`` section can be asked, whatever its kind."""
+
+    up_axis: Literal["y", "z"] = Field(
+        default="y", description="axis of the cameras that points up; only for rig calibrate"
+    )
+
+
+class DriveSection(Settings):
+    """What every ``plc:`` section can be asked, whatever moves the cables."""
+
+    #: What ``tcrctl rig check`` calls drives that do not answer.
+    called: ClassVar[str] = "drives"
+
+
+class CameraSettings(CameraSection):
     """An OptiTrack system that streams over NatNet."""
 
     kind: Literal["natnet"]
@@ -32,7 +47,6 @@ class CameraSettings(Settings):
     )
     allow_newer: bool = Field(default=False, description="decode versions newer than those that were tested")
     rate_hz: float | None = quantity("Hz", "frames per second; null: the server is asked", None, gt=0)
-    up_axis: Literal["y", "z"] = Field(default="y", description="as set in Motive; only for rig calibrate")
     jump_gate_mm: float = quantity(
         "mm", "a marker that has jumped further is not used; less than half the marker distance", 24.0, gt=0
     )
@@ -99,9 +113,17 @@ class Calibration(Settings):
         return self
 
 
-class _Plc(Settings):
+class _Plc(DriveSection):
+    called: ClassVar[str] = "PLC"
+
     unit: int = Field(default=1, ge=0, le=247, description="Modbus unit (slave) number")
     timeout_ms: float = quantity("ms", "how long an answer is waited for", 60.0, gt=0, le=1000)
+    watchdog_ms: float = quantity(
+        "ms",
+        "silence after which the PLC stops by itself; a control period too long for it is refused",
+        200.0,
+        gt=0,
+    )
     retries: int = Field(
         default=1, ge=0, le=3, description="an exchange without an answer is repeated so often"
     )
@@ -146,6 +168,33 @@ class ModbusRtu(_Plc):
         return self.device
 
 
+class Dynamixel(DriveSection):
+    """Dynamixel motors of the X series, one per cable; ``axis`` is the number of the motor (extra dynamixel)."""
+
+    called: ClassVar[str] = "Dynamixel bus"
+
+    kind: Literal["dynamixel"]
+    device: str = Field(min_length=1, description="for instance /dev/ttyUSB0")
+    baud: int = Field(default=1_000_000, ge=9600)
+    timeout_ms: float = quantity("ms", "how long an answer is waited for", 20.0, gt=0, le=1000)
+    mm_per_turn: float = quantity(
+        "mm", "cable per turn of the drum; the whole stroke has to fit in a turn", gt=0
+    )
+    zero_tick: int = Field(default=1024, ge=0, le=4095, description="position of the motors at tension-zero")
+    watchdog_ms: float = quantity(
+        "ms", "time after which they stop by their bus watchdog, in steps of 28", 300.0, ge=28, le=3500
+    )
+    current_limit_ma: float | None = quantity(
+        "mA", "largest current, in operating mode 5; null: mode 3, without", None, gt=0
+    )
+    current_unit_ma: float = quantity("mA", "unit of the model's goal current", 2.69, gt=0)
+
+    @property
+    def place(self) -> str:
+        """Where they are, for messages."""
+        return self.device
+
+
 class CableDrive(Settings):
     """The drive of one cable."""
 
@@ -167,7 +216,7 @@ class Antagonists(Settings):
 class MountedRobot(Settings):
     """One robot on this bench: its drives, its markers, where it hangs."""
 
-    plc: Annotated[ModbusTcp | ModbusRtu, Field(discriminator="kind")]
+    plc: Annotated[ModbusTcp | ModbusRtu | Dynamixel, Field(discriminator="kind")]
     cables: dict[str, CableDrive] = Field(
         min_length=1, description="drive of every cable of the robot, by name"
     )

@@ -41,7 +41,7 @@ def jog(bench, by_mm, cables=("c1",), check=lambda: None):
 
 def writer(bench):
     """A program that writes to the PLC without asking whose it is."""
-    return PlcBus(bus_settings(bench.loaded().mounted))
+    return PlcBus(bus_settings(bench.loaded().mounted.plc))
 
 
 def enabled(bench):

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Final
+
+#: Exit code of what must be put right before drives are armed.
+NOT_READY: Final = 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,1 @@
+"""Dynamixel motors of the X series on a serial bus, protocol 2.0."""

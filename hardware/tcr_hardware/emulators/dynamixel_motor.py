@@ -1,0 +1,98 @@
+"""One emulated Dynamixel motor: control table, motion at the profile velocity, bus watchdog, shutdown on errors."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tcr_hardware.dynamixel import table
+from tcr_hardware.dynamixel.table import Register
+
+#: Errors in status packets.
+RANGE, ACCESS = 0x04, 0x07
+_GOALS: Final = frozenset(
+    register.address for register in (table.GOAL_CURRENT, table.PROFILE_VELOCITY, table.GOAL_POSITION)
+)
+_READ_ONLY: Final = frozenset(
+    (table.MODEL.address, table.HARDWARE_ERROR.address, table.PRESENT_POSITION.address)
+)
+XM430_W350: Final = 1020
+
+
+class DynamixelMotor:
+    """A motor whose horn stands at ``turn`` counts, before the homing offset."""
+
+    def __init__(self, turn: int, now: float, mode: int = table.Mode.POSITION) -> None:
+        """Switch it on.
+
+        Args:
+            turn: Where its horn stands [counts].
+            now: Time [s].
+            mode: Operating mode.
+        """
+        self._data = bytearray(table.END)
+        self.turn, self._now, self._fed = float(turn), now, now
+        self._set(table.MODEL, XM430_W350)
+        self._set(table.OPERATING_MODE, mode)
+        self._set(table.VELOCITY_LIMIT, 200)
+        self._set(table.MAX_POSITION, table.TURN - 1)
+        self._set(table.GOAL_POSITION, turn)
+
+    def get(self, register: Register) -> int:
+        """Return a register, signed."""
+        end = register.address + register.size
+        return int.from_bytes(self._data[register.address : end], "little", signed=True)
+
+    def _set(self, register: Register, value: int) -> None:
+        bits = value & ((1 << 8 * register.size) - 1)
+        end = register.address + register.size
+        self._data[register.address : end] = bits.to_bytes(register.size, "little")
+
+    def fail(self, fault: table.HardwareFault) -> None:
+        """Shut down: the torque is gone, and the error stays until the motor is switched off and on."""
+        self._set(table.HARDWARE_ERROR, self.get(table.HARDWARE_ERROR) | fault)
+        self._set(table.TORQUE_ENABLE, 0)
+
+    def feed(self) -> None:
+        """Notice a packet on the bus."""
+        self._fed = self._now
+
+    def advance(self, now: float) -> None:
+        """Let time pass until ``now`` [s]."""
+        watchdog = self._data[table.BUS_WATCHDOG.address]
+        armed = 0 < watchdog < table.TRIPPED
+        end = self._fed + watchdog * table.WATCHDOG_UNIT
+        if armed and now > end:
+            self._move(max(0.0, end - self._now))
+            self._set(table.BUS_WATCHDOG, table.TRIPPED)
+            self._set(table.GOAL_POSITION, round(self.turn) + self.get(table.HOMING_OFFSET))
+        self._move(max(0.0, now - max(self._now, end if armed and now > end else self._now)))
+        self._now = now
+        self._set(table.PRESENT_POSITION, round(self.turn) + self.get(table.HOMING_OFFSET))
+
+    def _move(self, seconds: float) -> None:
+        if not self.get(table.TORQUE_ENABLE):
+            return
+        wanted = self.get(table.GOAL_POSITION) - self.get(table.HOMING_OFFSET)
+        speed = self.get(table.PROFILE_VELOCITY) or self.get(table.VELOCITY_LIMIT)
+        reach = speed * table.VELOCITY_UNIT * table.TURN * seconds
+        self.turn += min(reach, max(-reach, wanted - self.turn))
+
+    def read(self, address: int, count: int) -> bytes:
+        """Return bytes of the control table."""
+        return bytes(self._data[address : address + count])
+
+    def write(self, address: int, data: bytes) -> int:
+        """Write bytes; returns the error of the status packet, 0 if they were taken."""
+        if address in _READ_ONLY or (address < table.FIRST_VOLATILE and self.get(table.TORQUE_ENABLE)):
+            return ACCESS
+        value = int.from_bytes(data, "little", signed=True)
+        if address in _GOALS and self._data[table.BUS_WATCHDOG.address] == table.TRIPPED:
+            return RANGE
+        low, high = self.get(table.MIN_POSITION), self.get(table.MAX_POSITION)
+        bounded = self.get(table.OPERATING_MODE) == table.Mode.POSITION
+        if address == table.GOAL_POSITION.address and bounded and not low <= value <= high:
+            return RANGE
+        if address == table.TORQUE_ENABLE.address and value and self.get(table.HARDWARE_ERROR):
+            return ACCESS
+        self._data[address : address + len(data)] = data
+        return 0
