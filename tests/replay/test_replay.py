@@ -43,6 +43,7 @@ VARIANTS = {
     "saturated": ("controller.speed_limit_mm_s=4",),
     "stopped": ("safety.position_error_mm=0.2",),
     "markers left out": ("plant.cameras.outliers={share: 0.05, size_mm: 30}",),
+    "learnt gain": ("controller.prediction.rest_gain={}",),
     "held": ("plant.cameras.outliers={share: 0.15, size_mm: 60}", "safety.picture.least_share=0.7"),
 }
 BEFORE = (
@@ -57,6 +58,7 @@ FORMER = {
         *BEFORE,
         "controller.prediction.tension_gap=off",
         "controller.prediction.hole_drag=off",
+        "controller.prediction.rest_gain=off",
         "controller.prediction.offset.from_start=false",
     ),
     "literal": (*BEFORE, *VARIANTS["literal"]),
@@ -135,7 +137,7 @@ def test_steps_in_which_the_picture_was_in_doubt_are_recorded_as_such(logs):
 
 
 #: Keys of a prediction that did not exist.
-NEW = {"tension_gap", "hole_drag"}
+NEW = {"tension_gap", "hole_drag", "rest_gain"}
 
 
 def as_before(settings, beside):
