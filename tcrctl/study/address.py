@@ -25,7 +25,7 @@ _PACKAGE: Final = Path(__file__).parents[1]
 #: Parts of the program that stand above experiments, or beside them: they cannot change a number.
 ABOVE: Final = (
     "analysis", "api", "caches", "cli", "commissioning", "emulate", "executors", "extend", "identify", "paper",
-    "plots", "replay", "report", "stability", "study", "tune", "view", "workspace",
+    "plots", "replay", "report", "stability", "study", "testing", "tune", "view", "workspace",
 )  # fmt: skip
 #: Packages that kernels and numbers are made with.
 _NUMERIC: Final = ("llvmlite", "numba", "numpy", "scipy")

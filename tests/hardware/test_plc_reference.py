@@ -18,7 +18,7 @@ from tcr_hardware.emulators.plc_program import DEAD_CLOCK_SCANS, PlcProgram
 from tcr_hardware.modbus.document import register_map_markdown
 from tcr_hardware.modbus.registers import Control, FaultCode, Reject, Status, register_map
 from tcr_hardware.servo import ServoSettings
-from tcrctl.emulate.bench import MARGIN
+from tcrctl.emulate.drives import MARGIN
 from tcrctl.plant.rig.file import load_rig
 from tcrctl.robot.description import load_robot
 
