@@ -190,10 +190,8 @@ def forecast(
         away[k] = deviation[k] - memory.offset[k]
     held = np.zeros(ws.r.shape[0])
     drag_force(model, memory.drag, memory.slip.v, memory.slip.speed, held)
-    release, drag = (
-        response.Release(away, v, memory.learnt.gain),
-        response.Drag(memory.drag, held, tuning.follow),
-    )
+    release = response.Release(away, v, memory.learnt.gain)
+    drag = response.Drag(memory.drag, held, tuning.follow)
     change, stable = response.respond(model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis, drag)
     with_lag(change, grid.ahead[0], tuning.drives, now.behind, now.queue)
     free, gain = superpose(change, now.outputs, grid.edges)
@@ -207,12 +205,9 @@ class MultiStep:
         """Take a ``prediction:`` section, the control period [s], the robot, the drives' dead time [s]."""
         self._robot, self._feedforward = robot, settings.feedforward
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
-        self._tuning = make_tuning(period, settings.filter_s)._replace(
-            learning=learning(period), follow=settings.follow_s
-        )
-        self._tuning = self._tuning._replace(
-            gain=gain_learning(settings.rest_gain, self._tuning.blend, period)
-        )
+        tuning = make_tuning(period, settings.filter_s)
+        gain = gain_learning(settings.rest_gain, tuning.blend, period)
+        self._tuning = tuning._replace(learning=learning(period), follow=settings.follow_s, gain=gain)
         self._turn = settings.turn_s
         self._dead_time = dead_time
         self._work = make_workspace(robot.model)
@@ -244,7 +239,8 @@ class MultiStep:
         """Return offset and last velocities without the fixed base, if the offset moves, and the tension gap.
 
         The basis is left out: it turns within the modes it spans, which changes no response, and with nothing
-        left to correct an error of it has no effect of first order.
+        left to correct an error of it has no effect of first order. What is learnt of the gain is left out, too:
+        a predictor that is sharpened learns nothing.
         """
         if self._tuning.blend == 0.0:
             return self._gap.memory()
@@ -279,9 +275,8 @@ class MultiStep:
         reason = "" if good else "the model has no stable equilibrium at the present drives"
         at_rest = None
         if self._feedforward:
-            at_rest = pose.drive_gain(memory.at.equilibrium, memory.at.gain + memory.learnt.gain, robot.tip)[
-                :6
-            ]
+            moved = memory.at.gain + memory.learnt.gain
+            at_rest = pose.drive_gain(memory.at.equilibrium, moved, robot.tip)[:6]
         return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 
 from tcrctl.controller.prediction_settings import RestGainSettings
-from tcrctl.robot.module import FIXED
+from tcrctl.robot.module import FIXED, RING
 from tcrctl.signals import Array
 
 
@@ -98,9 +98,10 @@ def carry(known: RestGain, numbers: GainLearning, drive: Array, offset: Array, t
         for c in range(m):
             change += known.gain[k, c] * moved[c]
         offset[3 * FIXED + k] += change
-        node = (3 * FIXED + k) // 3
-        if tip <= node < tip + 3:
-            known.moved[k % 3] += change / 3.0
+    end = _end_gain(known.gain, tip)
+    for i in range(3):
+        for c in range(m):
+            known.moved[i] += end[i, c] * moved[c]
     across = np.zeros(m)
     for c in range(m):
         for j in range(m):
@@ -140,13 +141,13 @@ def tell(known: RestGain, numbers: GainLearning, found: Array, offset: Array, ti
         tip: Row of the first node of the tip ring.
     """
     P, size = known.covariance, known.covariance.shape[0]
-    part = P[0] / (P[0, 0] + 1.0)
+    scale = P[0, 0] + 1.0
+    part = P[0] / scale
     for k in range(found.shape[0]):
         missed = found[k] - offset[3 * FIXED + k]
         offset[3 * FIXED + k] += part[0] * missed
         for c in range(1, size):
             known.gain[k, c - 1] += part[c] * missed
-    scale = P[0, 0] + 1.0
     for i in range(size):
         for j in range(size):
             P[i, j] -= scale * part[i] * part[j]
@@ -154,14 +155,21 @@ def tell(known: RestGain, numbers: GainLearning, found: Array, offset: Array, ti
 
 
 @njit(cache=True, error_model="numpy")
+def _end_gain(gain: Array, tip: int) -> Array:
+    """Return by what G (n_free, m) moves the centre of the tip ring (3, m)."""
+    end = np.zeros((3, gain.shape[1]))
+    for node in range(tip - FIXED, tip - FIXED + RING):
+        for i in range(3):
+            for c in range(gain.shape[1]):
+                end[i, c] += gain[3 * node + i, c] / RING
+    return end
+
+
+@njit(cache=True, error_model="numpy")
 def _bound(known: RestGain, numbers: GainLearning, tip: int) -> None:
     """Scale G so that no drive moves the end by more than is believed."""
-    for c in range(known.gain.shape[1]):
-        square = 0.0
-        for i in range(3):
-            mean = 0.0
-            for node in range(tip, tip + 3):
-                mean += known.gain[3 * (node - FIXED) + i, c] / 3.0
-            square += mean * mean
-        if square > numbers.most * numbers.most:
-            known.gain[:, c] *= numbers.most / math.sqrt(square)
+    end = _end_gain(known.gain, tip)
+    for c in range(end.shape[1]):
+        size = math.sqrt(end[0, c] ** 2 + end[1, c] ** 2 + end[2, c] ** 2)
+        if size > numbers.most:
+            known.gain[:, c] *= numbers.most / size
