@@ -62,7 +62,8 @@ def paper(
 
     Runs whose computing time counts have the machine for themselves; the others run side by side. The report
     goes to a new folder DIR/TIME_paper_ID with paper.md, paper.json and all runs. Exit code 3: a bar was missed.
-    Ctrl-C stops all runs and keeps what is done. --seeds runs the study realistic, which resumes where it ended.
+    Ctrl-C stops all runs and keeps what is done. --seeds runs the studies realistic and calibrated, which resume
+    where they ended.
 
     Examples:
       tcrctl paper

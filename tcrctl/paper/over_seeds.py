@@ -1,6 +1,6 @@
-"""Rows of the table on plants as real as a laboratory's, over many seeds: the study ``realistic``.
+"""Rows of the table on plants as real as a laboratory's, over many seeds: studies ``realistic`` and ``calibrated``.
 
-Its rows are kept in its own folder, so that ``tcrctl sweep realistic`` and ``tcrctl paper`` do no run twice.
+Their rows are kept in their own folders, so that ``tcrctl sweep realistic`` and ``tcrctl paper`` do no run twice.
 """
 
 from __future__ import annotations
@@ -23,8 +23,13 @@ from tcrctl.study.statistics import Share, Spread, share, spread
 from tcrctl.study.sweep import Done, sweep
 from tcrctl.study.text import number
 
-STUDY: Final = "realistic"
-TITLES: Final = ("on moderate plants, median [95 %]", "worst", "stopped")
+#: Studies, nothing calibrated and each plant after a self-calibration; both have the same plants.
+STUDIES: Final = ("realistic", "calibrated")
+TITLES: Final = tuple(
+    title
+    for what in ("on moderate plants", "calibrated")
+    for title in (f"{what}, median [95 %]", "worst", "stopped")
+)
 
 Runs = Mapping[tuple[str, int], StudyRow]
 
@@ -65,11 +70,17 @@ def experiments_of(row: Row) -> tuple[str, ...]:
 
 
 def run_seeds(
-    rows: Sequence[Row], seeds: int, engine: Engine, out: Path, told: Callable[[PlannedRun, StudyRow], None]
+    name: str,
+    rows: Sequence[Row],
+    seeds: int,
+    engine: Engine,
+    out: Path,
+    told: Callable[[PlannedRun, StudyRow], None],
 ) -> Done | None:
-    """Run what the study has not yet of some rows; None if they need nothing.
+    """Run what a study has not yet of some rows; None if they need nothing of it.
 
     Args:
+        name: Of the study.
         rows: Of the table.
         seeds: How many plants.
         engine: Where.
@@ -79,7 +90,7 @@ def run_seeds(
     Raises:
         DeviceError: If the folder cannot be used.
     """
-    study = told_study(STUDY, (), {"seeds": f"1..{seeds}"})
+    study = told_study(name, (), {"seeds": f"1..{seeds}"})
     wanted = {name for row in rows for name in experiments_of(row)} & {*study.spec.experiments}
     if not wanted:
         return None

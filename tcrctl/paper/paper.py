@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,7 +17,7 @@ from tcrctl.experiment.provenance import versions
 from tcrctl.experiment.run_folder import RunFolder, make_run_folder
 from tcrctl.loop.interruption import Interruption
 from tcrctl.paper.job import Done, Job, do
-from tcrctl.paper.over_seeds import over_seeds, run_seeds
+from tcrctl.paper.over_seeds import STUDIES, over_seeds, run_seeds
 from tcrctl.paper.report import BAD, Line, make_line, markdown
 from tcrctl.paper.row import Row
 from tcrctl.paper.table import ROWS
@@ -176,10 +176,9 @@ def run_paper(
     except RunInterruptedError as error:
         interruption = error
     lines = tuple(make_line(row, done) for row in rows)
-    if seeds and interruption is None:
-        plants = run_seeds(rows, seeds, engine, out, seed_ended)
-        if plants is not None:
-            lines = tuple(replace(line, plants=over_seeds(line.row, plants)) for line in lines)
+    for study in STUDIES if seeds else ():
+        if interruption is None and (plants := run_seeds(study, rows, seeds, engine, out, seed_ended)):
+            lines = tuple(line.over(study, over_seeds(line.row, plants)) for line in lines)
             interruption = plants.interruption
     report = Report(folder.path, lines, engine.jobs, time.monotonic() - begin, load, interruption, seeds)
     _write(report, folder)

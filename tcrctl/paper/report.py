@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from tcrctl.errors import StoppedError
 from tcrctl.paper.job import Done, Job
+from tcrctl.paper.over_seeds import STUDIES, OverSeeds
 from tcrctl.paper.over_seeds import TITLES as PLANT_TITLES
-from tcrctl.paper.over_seeds import OverSeeds
 from tcrctl.paper.row import Row, Verdict
 
 TITLES: Final = ("work", "paper", "must reach", "going to", "measured", "verdict")
@@ -35,7 +35,7 @@ class Line:
         reason: Why there is no number; empty if there is one.
         measured: The number with all that belongs to it, as text.
         logs: Logs of its runs.
-        plants: The number over many plants as real as a laboratory's, if that was asked.
+        plants: The number over many plants as real as a laboratory's, by study, if that was asked.
     """
 
     row: Row
@@ -44,7 +44,7 @@ class Line:
     reason: str
     measured: str
     logs: tuple[str, ...]
-    plants: OverSeeds | None = None
+    plants: Mapping[str, OverSeeds] = field(default_factory=dict)
 
     def cells(self, *, with_plants: bool = False) -> tuple[str, ...]:
         """Return texts in the order of :func:`titles`."""
@@ -52,7 +52,8 @@ class Line:
         work = f"{row.work} [{row.unit}]" if row.unit else row.work
         bars = ("" if limit is None else f"{sign}{limit:g}" for limit in (row.must, row.goal))
         word = _WORDS[self.verdict]
-        plants = ("",) * len(PLANT_TITLES) if self.plants is None else self.plants.cells()
+        each = (self.plants.get(study) for study in STUDIES)
+        plants = [cell for found in each for cell in (found.cells() if found else ("", "", ""))]
         verdict = f"{word}: {self.reason}" if self.reason else word
         return (work, row.paper, *bars, self.measured, verdict, *(plants if with_plants else ()))
 
@@ -71,8 +72,15 @@ class Line:
             "verdict": self.verdict,
             "reason": self.reason,
             "logs": list(self.logs),
-            "on_moderate_plants": None if self.plants is None else self.plants.as_json(),
+            **{
+                key: self.plants[study].as_json() if study in self.plants else None
+                for key, study in zip(("on_moderate_plants", "calibrated"), STUDIES, strict=True)
+            },
         }
+
+    def over(self, study: str, found: OverSeeds | None) -> Line:
+        """Return the row with its number over the plants of a study, if it has one."""
+        return self if found is None else replace(self, plants={**self.plants, study: found})
 
 
 def make_line(row: Row, done: Mapping[Job, Done]) -> Line:

@@ -33,13 +33,16 @@ _NUMERIC: Final = ("llvmlite", "numba", "numpy", "scipy")
 _WORDS: Final = ("description", "source", "robot")
 
 
-def address(loaded: LoadedSpec, seed: int, *, random_path: bool) -> str:
+def address(
+    loaded: LoadedSpec, seed: int, *, random_path: bool = False, calibration: str | None = None
+) -> str:
     """Return the address of a run, 64 hexadecimal digits.
 
     Args:
         loaded: The experiment.
         seed: Of the run.
         random_path: Whether the seed draws its trajectory.
+        calibration: Address of the self-calibration whose result it knows; None without.
     """
     spec = with_draws(loaded.spec, len(loaded.robot.cables.routes), seed).model_dump(mode="json")
     if loaded.plant_robot is not None:
@@ -51,6 +54,7 @@ def address(loaded: LoadedSpec, seed: int, *, random_path: bool) -> str:
         "files": [origin.sha256 for origin in origins(loaded.spec)],
         "samples": [hashlib.sha256(data).hexdigest() for data in table_file(loaded.spec.trajectory).values()],
         "random_path": random_path,
+        "calibration": calibration,
         "program": program(),
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

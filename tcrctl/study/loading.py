@@ -63,12 +63,15 @@ class LoadedStudy:
         Raises:
             SpecError: If it is a study.
         """
-        path = name
-        if shipped.is_path(name) and (self.folder / Path(name).expanduser()).is_file():
-            path = str(self.folder / Path(name).expanduser())
+        path = self.beside(name)
         if shipped.is_study(path):
             self._refuse(name, f"{name} is a study; a study is made of experiments")
         return path
+
+    def beside(self, name: str) -> str:
+        """Return the path of a file beside the study; a name, or a path that is none, as it is."""
+        path = self.folder / Path(name).expanduser()
+        return str(path) if shipped.is_path(name) and path.is_file() else name
 
     def _beside(self, key: str, value: Any) -> Any:
         """Look for a robot's file beside the study; leave everything else as it is given."""

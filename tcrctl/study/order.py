@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
-from tcrctl.errors import InfeasibleError, NoEquilibriumError, TcrctlError, TimeLimitError
+from tcrctl.errors import InfeasibleError, NoEquilibriumError, StoppedError, TcrctlError, TimeLimitError
 from tcrctl.experiment.prepare import Experiment, plan, prepare
 from tcrctl.experiment.random_path import random_path
 from tcrctl.experiment.run import run_experiment
@@ -19,6 +19,7 @@ from tcrctl.experiment.summary import Summary
 from tcrctl.experiment.unrecorded import run_unrecorded
 from tcrctl.study.address import program
 from tcrctl.study.row import TIMING, Row, same_every_time
+from tcrctl.study.self_calibration import SelfCalibration
 
 Logs: TypeAlias = Literal["all", "failed", "none"]
 #: Exit codes from here on are signals: the run says nothing of the experiment.
@@ -37,6 +38,8 @@ class Order:
         timeout_s: A run that takes longer is stopped [s].
         logs: Which logs are kept.
         out: Where, a folder.
+        calibration: What the run begins with; None if it knows nothing of its plant.
+        found: Folder of what was found.
     """
 
     address: str
@@ -46,6 +49,8 @@ class Order:
     timeout_s: float | None
     logs: Logs
     out: Path
+    calibration: SelfCalibration | None
+    found: Path
 
 
 def do(order: Order) -> Row | None:
@@ -61,6 +66,8 @@ def do(order: Order) -> Row | None:
         row = Row(order.address, "infeasible", str(error))
     except TimeLimitError as error:
         row = Row(order.address, "timeout", str(error))
+    except StoppedError as error:  # before the run began
+        row = Row(order.address, "aborted", str(error))
     except TcrctlError as error:
         row = Row(order.address, "error", str(error))
     except Exception as error:
@@ -78,11 +85,14 @@ def _limit(timeout_s: float | None, begin: float) -> Callable[[], None]:
 
 def _done(order: Order, check: Callable[[], None]) -> Row | None:
     path: dict[str, Any] = {}
+    loaded = _known(order, check)
+    if loaded is None:
+        return None
     if order.random_path:
-        experiment, refused = random_path(order.loaded, order.seed)
+        experiment, refused = random_path(loaded, order.seed)
         path = {"refused": refused, "trajectory": experiment.spec.trajectory.model_dump(mode="json")}
     else:
-        experiment = prepare(order.loaded, seed=order.seed)
+        experiment = prepare(loaded, seed=order.seed)
         _check_feasible(experiment)
     check()
     summary = _run(order, experiment, check)
@@ -100,6 +110,13 @@ def _done(order: Order, check: Callable[[], None]) -> Row | None:
         log=made["log"],
         path=path,
     )
+
+
+def _known(order: Order, check: Callable[[], None]) -> LoadedSpec | None:
+    """Return the experiment with what it knows of its plant; None if a signal came before that was found."""
+    if order.calibration is None:
+        return order.loaded
+    return order.calibration.known_by(order.loaded, order.seed, order.found, check)
 
 
 def _run(order: Order, experiment: Experiment, check: Callable[[], None]) -> Summary:

@@ -33,6 +33,15 @@ class CompareSettings(Settings):
     )
 
 
+class CalibrateSettings(Settings):
+    """Runs that know what a self-calibration found on the plant of their seed (docs/identify.md)."""
+
+    cases: tuple[str, ...] = Field(default=(), description="cases of which that holds; all if left out")
+    excitation: str = Field(
+        default="excitation", description="experiment whose log it is found in, shipped or a path; open loop"
+    )
+
+
 class StudySpec(Settings):
     """One study, every default filled in."""
 
@@ -58,6 +67,9 @@ class StudySpec(Settings):
     design_seed: int = Field(default=0, ge=0, lt=2**32, description="seed of random, sobol and latin")
     seeds: Seeds | None = Field(
         default=None, description="seeds of every combination, a list or FIRST..LAST; each experiment's own"
+    )
+    calibrate: CalibrateSettings | None = Field(
+        default=None, description="self-calibration before the runs, once for every plant"
     )
     measures: Annotated[tuple[str, ...], Field(min_length=1)] = Field(
         default=MEASURES, description="what is compared, as in run --json"
@@ -134,6 +146,9 @@ def _unknown_names(spec: StudySpec) -> Iterator[Finding]:
             close = difflib.get_close_matches(name, UNITS, n=1)
             said = f"; did you mean {close[0]}?" if close else f"; known: {', '.join(UNITS)}"
             yield ("measures", i), f"a run has no result {name}{said}"
+    for i, name in enumerate(spec.calibrate.cases if spec.calibrate else ()):
+        if name not in spec.cases:
+            yield ("calibrate", "cases", i), f"is no case; there are {', '.join(spec.cases) or 'none'}"
     for i, name in enumerate(spec.group_by or ()):
         if name not in spec.factors:
             yield ("group_by", i), f"is no factor; there are {', '.join(spec.factors)}"

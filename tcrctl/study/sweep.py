@@ -23,6 +23,7 @@ from tcrctl.study.loading import LoadedStudy
 from tcrctl.study.order import Logs, Order, do
 from tcrctl.study.plan import PlannedRun
 from tcrctl.study.row import WITHOUT_RESULT, Row, unanswered
+from tcrctl.study.self_calibration import FOLDER, SelfCalibration, calibration_of
 from tcrctl.study.store import Store
 
 #: The study as it was run, in its folder; and where logs go there.
@@ -161,9 +162,11 @@ def _orders(study: LoadedStudy, missing: Sequence[PlannedRun], folder: Path, log
     """Yield orders in the order of the plan; the experiment of a cell is read once for all its seeds."""
     cell: Cell | None = None
     loaded: LoadedSpec | None = None
+    calibration: SelfCalibration | None = None
     for run in missing:
         if loaded is None or run.cell is not cell:
             cell, loaded = run.cell, study.load(run.cell)
+            calibration = calibration_of(study, cell, loaded)
         yield Order(
             run.address,
             loaded,
@@ -172,4 +175,6 @@ def _orders(study: LoadedStudy, missing: Sequence[PlannedRun], folder: Path, log
             study.spec.timeout_s,
             logs,
             (folder / RUNS).absolute(),
+            calibration,
+            (folder / FOLDER).absolute(),
         )

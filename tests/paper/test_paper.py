@@ -7,7 +7,6 @@ import os
 import signal
 import threading
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,8 +22,7 @@ from tcrctl.errors import RunInterruptedError, UnknownNameError
 from tcrctl.executors.engine import Engine
 from tcrctl.experiment.spec import load_spec
 from tcrctl.paper import job as paper_job
-from tcrctl.paper import over_seeds as over_plants
-from tcrctl.paper import paper
+from tcrctl.paper import paper, report
 from tcrctl.paper.checks import CHECKS
 from tcrctl.paper.job import Check, Done, Run, do
 from tcrctl.paper.over_seeds import experiments_of, over_seeds
@@ -246,11 +244,13 @@ def test_the_columns_of_many_plants_are_there_only_if_they_were_asked():
     job = Result("a")
     line = make_line(row(job), {job: Done(job, {"x": 0.5}, "", 1.0)})
     letter = Row("t", "T", "6.3", "mm", 3.0, 0.5, (Run("letter_t"),), worst("position_error_mm.max"))
-    more = replace(line, plants=over_seeds(letter, plants(letter_t=[1.0, 2.0, 3.0])))
+    more = line.over("realistic", over_seeds(letter, plants(letter_t=[1.0, 2.0, 3.0])))
+    both = more.over("calibrated", over_seeds(letter, plants(letter_t=[0.5, 0.6, 0.55])))
     assert titles([line]) == TITLES
-    assert len(titles([line, more])) == len(TITLES) + 3
-    assert {len(texts) for texts in cells([line, more])} == {len(TITLES) + 3}
-    assert "| 2 [1, 3] | 3 | 0 of 3 |" in markdown([line, more], [])
+    assert len(titles([line, more])) == len(TITLES) + 6
+    assert {len(texts) for texts in cells([line, more])} == {len(TITLES) + 6}
+    assert "| 2 [1, 3] | 3 | 0 of 3 |  |  |  |" in markdown([line, more], [])
+    assert "| 2 [1, 3] | 3 | 0 of 3 | 0.55 [0.5, 0.6] | 0.6 | 0 of 3 |" in markdown([line, both], [])
 
 
 def test_the_displacements_of_table_2_keep_their_lengths_in_the_robots_frame(tcr700):
@@ -280,7 +280,9 @@ def test_the_command_runs_rows_on_other_plants_and_keeps_them_in_the_study(tmp_p
     monkeypatch.setattr(paper_job, "load_spec", lambda name, overrides: short_spec("plant.step_ms=10"))
     letter = Row("t", "T", "6.3", "mm", 3.0, 0.5, (Run("letter_t"),), worst("position_error_mm.max"))
     monkeypatch.setattr(paper, "ROWS", (letter,))
-    monkeypatch.setattr(over_plants, "STUDY", str(study_file(tmp_path)))  # of short runs too
+    short = str(study_file(tmp_path))
+    monkeypatch.setattr(paper, "STUDIES", (short,))  # of short runs too
+    monkeypatch.setattr(report, "STUDIES", (short, "calibrated"))
     order = ["paper", "--seeds", "3", "--jobs", "1", "--json", "--quiet", "--out", str(tmp_path)]
     assert main(order) == 0
     (line,) = json.loads(capsys.readouterr().out)["rows"]
