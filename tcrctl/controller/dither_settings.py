@@ -47,7 +47,7 @@ class DitherSettings(Settings):
         gt=0,
     )
     integral_gain_1_s: float = quantity(
-        "1/s", "integral gain while it runs, if that is the smaller one", 2.0, gt=0
+        "1/s", "integral gain while it runs, if that is the smaller one", 0.7, gt=0
     )
 
     @model_validator(mode="after")
