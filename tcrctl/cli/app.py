@@ -15,6 +15,7 @@ import typer
 
 from tcrctl import __version__
 from tcrctl.caches.flags import set_flags
+from tcrctl.cli.accuracy import accuracy
 from tcrctl.cli.commit import commit
 from tcrctl.cli.diff import diff
 from tcrctl.cli.emulate import emulate
@@ -64,13 +65,14 @@ VERBS: dict[str, Callable[..., None]] = {
     "paper": paper,
     "replay": replay,
     "diff": diff,
+    "accuracy": accuracy,
     "play": play,
     "plot": plot,
     "report": report,
 }
 
 #: Verbs of which nothing is left if their output cannot be written.
-ONLY_SAY = ("list", "kinds", "show", "schema", "info", "runs", "diff")
+ONLY_SAY = ("list", "kinds", "show", "schema", "info", "runs", "diff", "accuracy")
 
 
 #: So many digits of a commit tell it apart.

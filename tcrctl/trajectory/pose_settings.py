@@ -80,6 +80,7 @@ class WaypointsSettings(TrajectorySection):
     points: Annotated[tuple[WaypointSettings, ...], AfterValidator(not_empty)] = Field(
         description="poses in order, at least one; all with or all without orientation"
     )
+    cycles: int = Field(default=1, ge=1, le=1000, description="how often they are gone through")
     speed_limit_mm_s: Positive = quantity("mm/s", "peak speed", 20.0)
     acceleration_limit_mm_s2: Positive = quantity("mm/s2", "peak acceleration", 30.0)
     angular_speed_limit_deg_s: Positive = quantity("deg/s", "peak angular speed of the normal", 5.0)

@@ -32,9 +32,10 @@ def build_waypoints(settings: WaypointsSettings, robot: Robot) -> PosePath:
 
 def legs(settings: WaypointsSettings, home: EndPose) -> Iterator[PoseMove]:
     """Yield lead-in, legs, dwells and the final rest in order."""
-    poses = [home, *(pose_of(point, home.position) for point in settings.points)]
+    points = settings.points * settings.cycles
+    poses = [home, *(pose_of(point, home.position) for point in points)]
     yield rest(settings.lead_in_s)
-    for (start, end), point in zip(pairwise(poses), settings.points, strict=True):
+    for (start, end), point in zip(pairwise(poses), points, strict=True):
         move = StraightMove(start, end)
         limits = limits_of(move, settings)
         yield PoseMove(move, rest_to_rest([Zone(1.0, 0.0, limits.speed)], limits))
