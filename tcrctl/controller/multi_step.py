@@ -269,7 +269,7 @@ class MultiStep:
             robot.model, self._load, self._work, memory, now, self.grid, robot.tip, tuning
         )
         if outcome.converged:
-            free[:, POSE_ROWS:] -= self._gap.lasting(estimate.tension - self._work.tension)
+            free[:, POSE_ROWS:] -= self._gap.left_out(estimate.tension - self._work.tension)
             self._fresh = self._fresh + 1 if self._fresh and at.settling else 0
         good, self._solved = outcome.converged and stable, outcome.converged
         reason = "" if good else "the model has no stable equilibrium at the present drives"

@@ -30,6 +30,15 @@ class TensionGapSettings(Settings):
     """Cable tensions are not read off positions alone: lasting differences from the model's are left out."""
 
     filter_s: float = quantity("s", "time constant after which a difference counts as lasting", 1.0, gt=0)
+    smooth_s: float = quantity(
+        "s", "time constant up to which one counts as noise of the cameras and is left out, too", 0.2, ge=0
+    )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> TensionGapSettings:
+        limit = f"must be below filter_s, {self.filter_s:g}, not {self.smooth_s:g}"
+        refuse([(("smooth_s",), limit)] if self.smooth_s >= self.filter_s else [])
+        return self
 
 
 class HoleDragSettings(Settings):

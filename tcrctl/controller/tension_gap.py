@@ -1,7 +1,8 @@
-"""The lasting difference between estimated tensions and the model's, which a prediction leaves out.
+"""What a prediction leaves out of the difference between estimated tensions and the model's.
 
 A millimetre of length error is 1.5 N, so tensions read off marker positions are wrong by newtons for ever, and a
-controller that believes them winds in or pays out. Only what changes faster than the filter is believed.
+controller that believes them winds in or pays out. And they jump by newtons when a marker is lost: a controller
+that takes this for a cable about to go slack throws the end to save it. Only what lies between is believed.
 """
 
 from __future__ import annotations
@@ -16,25 +17,34 @@ from tcrctl.signals import Array
 
 
 class TensionGap:
-    """A filter that begins at the first difference that it is told."""
+    """Two filters that begin at the first difference that they are told."""
 
     def __init__(self, settings: TensionGapSettings | None, period: float, cables: int) -> None:
         """Take a ``tension_gap:`` section, or None for none, the control period [s] and the number of cables."""
-        self._blend = 0.0 if settings is None else -float(np.expm1(-period / settings.filter_s))
-        self._lasting, self._begun = np.zeros(cables), False
+        self._blend = 0.0 if settings is None else _part(period, settings.filter_s)
+        self._quick = 1.0 if settings is None else _part(period, settings.smooth_s)
+        self._lasting, self._smooth, self._begun = np.zeros(cables), np.zeros(cables), False
 
     def memory(self) -> Mapping[str, Kept]:
-        """Return the lasting difference, if there is a filter."""
-        return {} if self._blend == 0.0 else {"tension_gap": Kept(self._lasting, TENSION)}
+        """Return the lasting difference and the smooth one, if there are such filters."""
+        found = {} if self._blend == 0.0 else {"tension_gap": Kept(self._lasting, TENSION)}
+        return {**found, **({} if self._quick == 1.0 else {"tension_smooth": Kept(self._smooth, TENSION)})}
 
-    def lasting(self, gap: Array) -> Array:
-        """Return what lasts of the difference, zero if that is off (m,) [N].
+    def left_out(self, gap: Array) -> Array:
+        """Return what lasts of the difference and what is noise, zero if that is off (m,) [N].
 
         Args:
             gap: Estimated tensions minus those of the model at rest (m,) [N]; passed over if it is no number.
         """
-        if self._blend > 0.0 and np.isfinite(gap).all():
-            if not self._begun:
-                self._lasting[:], self._begun = gap, True
-            self._lasting += self._blend * (gap - self._lasting)
-        return self._lasting
+        if self._blend == 0.0 or not np.isfinite(gap).all():
+            return self._lasting
+        if not self._begun:
+            self._lasting[:], self._smooth[:], self._begun = gap, gap, True
+        self._lasting += self._blend * (gap - self._lasting)
+        self._smooth += self._quick * (gap - self._smooth)
+        return self._lasting + (gap - self._smooth)
+
+
+def _part(period: float, time: float) -> float:
+    """Return the part of the way that a filter goes in a period; all of it without a time constant."""
+    return 1.0 if time == 0.0 else -float(np.expm1(-period / time))

@@ -64,5 +64,7 @@ def _without_news(controller: dict[str, Any]) -> dict[str, Any]:
         offset = prediction.get("offset", {})
         if isinstance(offset, dict):
             prediction["offset"] = {"from_start": False, **offset}
+        if isinstance(prediction["tension_gap"], dict):
+            prediction["tension_gap"] = {"smooth_s": 0.0, **prediction["tension_gap"]}
         found["prediction"] = prediction
     return found

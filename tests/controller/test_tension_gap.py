@@ -1,4 +1,4 @@
-"""Laws of the tension gap: lasting differences are left out, quick ones are believed, nobody winds in."""
+"""Laws of the tension gap: lasting differences are left out, and jumps are; nobody winds in."""
 
 from __future__ import annotations
 
@@ -17,34 +17,51 @@ PERIOD = 0.05
 def test_a_difference_that_was_there_from_the_start_lasts():
     gap = TensionGap(TensionGapSettings(), PERIOD, 3)
     for _ in range(5):
-        np.testing.assert_allclose(gap.lasting(np.array([1.0, -2.0, 3.0])), [1.0, -2.0, 3.0])
+        np.testing.assert_allclose(gap.left_out(np.array([1.0, -2.0, 3.0])), [1.0, -2.0, 3.0])
 
 
 def test_a_later_difference_lasts_after_the_time_constant():
-    gap = TensionGap(TensionGapSettings(filter_s=1.0), PERIOD, 1)
-    gap.lasting(np.zeros(1))
-    found = [gap.lasting(np.ones(1))[0] for _ in range(round(1.0 / PERIOD))]
+    gap = TensionGap(TensionGapSettings(filter_s=1.0, smooth_s=0), PERIOD, 1)
+    gap.left_out(np.zeros(1))
+    found = [gap.left_out(np.ones(1))[0] for _ in range(round(1.0 / PERIOD))]
     assert found[0] == pytest.approx(1.0 - np.exp(-PERIOD))
     assert found[-1] == pytest.approx(1.0 - np.exp(-1.0))
 
 
+def test_a_jump_of_one_frame_is_left_out_and_a_swing_of_a_second_is_believed():
+    gap = TensionGap(TensionGapSettings(filter_s=10.0, smooth_s=0.2), PERIOD, 1)
+    gap.left_out(np.zeros(1))
+    jump = np.array([8.0])
+    assert abs((jump - gap.left_out(jump))[0]) < 0.25 * jump[0]
+    t = PERIOD * np.arange(400)
+    swing = np.sin(np.pi * t)
+    believed = [x - gap.left_out(np.array([x]))[0] for x in swing]
+    assert 0.75 < np.max(believed[200:]) < 1.0
+
+
+def test_without_smoothing_a_jump_is_believed_at_once():
+    gap = TensionGap(TensionGapSettings(filter_s=1e6, smooth_s=0.0), PERIOD, 1)
+    gap.left_out(np.zeros(1))
+    assert gap.left_out(np.ones(1))[0] == pytest.approx(0.0, abs=1e-6)
+
+
 def test_off_nothing_lasts_and_nothing_is_kept():
     gap = TensionGap(None, PERIOD, 2)
-    assert not gap.lasting(np.ones(2)).any()
+    assert not gap.left_out(np.ones(2)).any()
     assert gap.memory() == {}
 
 
 def test_what_is_no_number_is_passed_over():
     gap = TensionGap(TensionGapSettings(), PERIOD, 2)
-    gap.lasting(np.array([1.0, 2.0]))
-    np.testing.assert_array_equal(gap.lasting(np.array([np.nan, 5.0])), [1.0, 2.0])
+    gap.left_out(np.array([1.0, 2.0]))
+    np.testing.assert_array_equal(gap.left_out(np.array([np.nan, 5.0])), [1.0, 2.0])
 
 
 def test_its_memory_is_the_filter_itself():
     gap = TensionGap(TensionGapSettings(), PERIOD, 2)
-    gap.lasting(np.ones(2))
+    gap.left_out(np.ones(2))
     gap.memory()["tension_gap"].values[:] = 4.0
-    np.testing.assert_allclose(gap.lasting(np.full(2, 4.0)), 4.0)
+    np.testing.assert_allclose(gap.left_out(np.full(2, 4.0)), 4.0)
 
 
 @pytest.mark.parametrize("offset", ["off", {"filter_s": 0.3}])
