@@ -39,7 +39,7 @@ def validate(
             problems += error.problems
         except InputError as error:
             said = str(error).removeprefix(f"{name}: ")
-            problems.append(Problem(name, "", f"{said} {error.hint}".strip()))
+            problems.append(Problem(name, "", f"{said}. {error.hint}" if error.hint else said))
     if not as_json:
         for name in valid:
             print(f"{name}: ok")
