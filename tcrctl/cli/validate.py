@@ -38,8 +38,7 @@ def validate(
         except SpecError as error:
             problems += error.problems
         except InputError as error:
-            said = str(error).removeprefix(f"{name}: ")
-            problems.append(Problem(name, "", f"{said}. {error.hint}" if error.hint else said))
+            problems.append(Problem(name, "", error.with_hint.removeprefix(f"{name}: ")))
     if not as_json:
         for name in valid:
             print(f"{name}: ok")
