@@ -27,11 +27,6 @@ class TcrctlError(Exception):
         super().__init__(visible(message))
         self.hint = visible(hint)
 
-    @property
-    def with_hint(self) -> str:
-        """What went wrong, and what can be done about it, for places that have one line."""
-        return f"{self}. {self.hint}" if self.hint else str(self)
-
 
 @dataclass(frozen=True, slots=True)
 class Problem:
