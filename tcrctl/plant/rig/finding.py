@@ -31,7 +31,7 @@ class Finding:
         return {**asdict(self), "ok": self.exit_code == 0}
 
 
-def told(error: TcrctlError) -> str:
+def with_hint(error: TcrctlError) -> str:
     """Return what went wrong, and what can be done about it, for places that have one line."""
     return f"{error}. {error.hint}" if error.hint else str(error)
 
