@@ -2,6 +2,7 @@
 
 nox -s lint types fast        # before every commit
 nox -s test -- -k replay      # what stands after -- goes to pytest
+nox -s thorough               # all tests, those too that are left out by default, with more examples
 nox -s docs                   # build the documentation site with all its figures, in build/site
 nox -s examples               # install the packages in examples/ and run their tests
 nox -s pictures bench         # draw the pictures of the documents again, print the tables of cost
@@ -46,8 +47,14 @@ def fast(session: nox.Session) -> None:
 
 @nox.session
 def test(session: nox.Session) -> None:
-    """Run all tests."""
+    """Run all tests but those that repeat at length what a shorter one states."""
     session.run("python", "-m", "pytest", *session.posargs)
+
+
+@nox.session
+def thorough(session: nox.Session) -> None:
+    """Run all tests, with more examples of every property."""
+    session.run("python", "-m", "pytest", "-m", "", *session.posargs)
 
 
 @nox.session

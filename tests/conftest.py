@@ -16,13 +16,17 @@ if TYPE_CHECKING:
     from tcrctl.robot.robot import Robot
 
 #: The first example may compile kernels, so no deadline; the same examples every time.
-hypothesis.settings.register_profile("tcrctl", deadline=None, derandomize=True, print_blob=True)
-hypothesis.settings.register_profile("fast", hypothesis.settings.get_profile("tcrctl"), max_examples=20)
+hypothesis.settings.register_profile("thorough", deadline=None, derandomize=True, print_blob=True)
+for name, examples in (("usual", 30), ("fast", 20)):
+    thorough = hypothesis.settings.get_profile("thorough")
+    hypothesis.settings.register_profile(name, thorough, max_examples=examples)
+#: Examples of a property that does not say how many it needs, by what is asked for with -m.
+PROFILES = {"fast": "fast", "": "thorough", "thorough": "thorough"}
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Before numba is imported."""
-    hypothesis.settings.load_profile("fast" if config.option.markexpr == "fast" else "tcrctl")
+    hypothesis.settings.load_profile(PROFILES.get(config.option.markexpr, "usual"))
     os.environ.setdefault("NUMBA_OPT", "1")  # as the command line does, so that kernels are the same
 
 

@@ -13,6 +13,7 @@ import typer
 from support.shown_commands import blocks, shown, with_files
 from tcrctl.cli.app import VERBS, build_app, main
 from tcrctl.cli.rig.verbs import RIG_VERBS
+from tcrctl.config import shipped
 from tcrctl.errors import InputError
 
 ROOT = Path(__file__).parents[1]
@@ -88,7 +89,44 @@ def typed(page, capsys):
     return wrong
 
 
+#: What makes the quick start's experiments short: text of their files, and what is there instead.
+SHORTER = {
+    "letter_t": {
+        "[[-30, 40], [30, 40]]": "[[-3, 4], [3, 4]]",
+        "[[0, 40], [0, -40]]": "[[0, 4], [0, -4]]",
+        "offset_mm: [0, 0, 40]": "offset_mm: [0, 0, 6]",
+        "lead_in_s: 1.0": "lead_in_s: 0.2",
+        "dwell_s: 1.0": "dwell_s: 0",
+        "settle_s: 3.0": "settle_s: 0.2",
+    },
+    "dynamic_10s": {
+        "tilt_deg: [20, 20]": "tilt_deg: [2, 2]",
+        "turn_s: 3.5": "turn_s: 0.7",
+        "ramp_s: 1.5": "ramp_s: 0.3",
+        "in_s: 2.5": "in_s: 0.5",
+        "out_s: 2.5": "out_s: 0.5",
+    },
+}
+
+
+@pytest.fixture(params=["short experiments", pytest.param("as shipped", marks=pytest.mark.thorough)])
+def length(request, tmp_path_factory, monkeypatch):
+    """Shipped experiments whose files are shorter, or those that there are."""
+    if request.param == "as shipped":
+        return
+    files, shorter = shipped.experiments(), tmp_path_factory.mktemp("shipped")
+    for name, changes in SHORTER.items():
+        text = files[name].read_text()
+        for old, new in changes.items():
+            assert old in text, (name, old)
+            text = text.replace(old, new)
+        files[name] = shorter / f"{name}.yaml"
+        files[name].write_text(text)
+    monkeypatch.setattr(shipped, "experiments", lambda: files)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("length")
 def test_the_quick_start_works_as_it_stands(folder, capsys):
     assert typed("start.md", capsys) == []
 

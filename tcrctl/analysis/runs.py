@@ -12,9 +12,11 @@ from typing import Any, Final
 
 from tcrctl.analysis.condition import Condition, Value
 from tcrctl.config import strict_yaml
+from tcrctl.config.budget import MAX_BYTES
 from tcrctl.errors import DeviceError, InputError
 from tcrctl.experiment.run_folder import LATEST, SUMMARY
 from tcrctl.log.file_names import RESOLVED
+from tcrctl.log.run_files import json_of
 
 TAGS: Final = "tags.json"
 
@@ -122,12 +124,24 @@ def _runs(out: Path) -> Iterator[FoundRun]:
     for path in sorted(out.glob(f"*/{SUMMARY}")):
         if path.parent.name == LATEST:
             continue
-        try:
-            summary = json.loads(path.read_text("utf-8"))
-        except (OSError, ValueError, RecursionError):
-            continue
-        if isinstance(summary, dict) and "run_id" in summary:
+        summary = _summary(path)
+        if summary is not None and "run_id" in summary:
             yield FoundRun(path.parent, summary)
+
+
+def unreadable(out: Path) -> list[Path]:
+    """Return the folders below ``out`` whose result is there and cannot be read."""
+    paths = (path for path in sorted(out.glob(f"*/{SUMMARY}")) if path.parent.name != LATEST)
+    return [path.parent for path in paths if _summary(path) is None]
+
+
+def _summary(path: Path) -> Mapping[str, Any] | None:
+    """Return what a file says as a map of JSON; None if it cannot be read, or is far too large for that."""
+    try:
+        found = json_of(path.read_text("utf-8")) if path.stat().st_size <= MAX_BYTES else None
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None
 
 
 def in_order(runs: Sequence[FoundRun], name: str) -> list[FoundRun]:

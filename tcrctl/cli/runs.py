@@ -78,6 +78,7 @@ def runs(
     if form not in FORMATS:
         raise UnknownNameError("format", form, FORMATS)
     found = _found(out, which)
+    _warn_of_unreadable(out)
     if doing.remove:
         _remove(found, yes=doing.yes, as_json=as_json)
         return
@@ -92,6 +93,15 @@ def runs(
         print(json.dumps({"status": "success", "runs": [_as_json(run) for run in found]}))
     else:
         _print(found, columns.split(",") if columns else list(COLUMNS), form)
+
+
+def _warn_of_unreadable(out: Path) -> None:
+    from tcrctl.analysis.runs import unreadable
+
+    left_out = [str(folder) for folder in unreadable(out)]
+    if left_out:
+        said = ", ".join(left_out[:3]) + (f" and {len(left_out) - 3} more" if left_out[3:] else "")
+        print(f"warning: left out, summary.json cannot be read: {said}", file=sys.stderr)
 
 
 def _found(out: Path, which: Which) -> list[FoundRun]:

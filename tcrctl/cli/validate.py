@@ -38,7 +38,8 @@ def validate(
         except SpecError as error:
             problems += error.problems
         except InputError as error:
-            problems.append(Problem(name, "", f"{error} {error.hint}".strip()))
+            said = str(error).removeprefix(f"{name}: ")
+            problems.append(Problem(name, "", f"{said}. {error.hint}" if error.hint else said))
     if not as_json:
         for name in valid:
             print(f"{name}: ok")

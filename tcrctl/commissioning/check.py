@@ -13,7 +13,7 @@ from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
 from tcrctl.plant.rig.devices import Cameras, Drives, DriveStatus, Sighting
 from tcrctl.plant.rig.file import LoadedRig
-from tcrctl.plant.rig.finding import NOT_READY, Finding
+from tcrctl.plant.rig.finding import NOT_READY, Finding, with_hint
 from tcrctl.plant.rig.mounting import CableAxis, cable_axes, mounting
 from tcrctl.plant.rig.own_limits import UNWATCHED, check_limits, check_load
 from tcrctl.plant.rig.settings import SafetyRules
@@ -45,18 +45,18 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
     try:
         cameras = connect_cameras(loaded, wanted)
     except (DeviceError, InputError) as error:
-        yield Finding("cameras", str(error), error.exit_code)
+        yield Finding("cameras", with_hint(error), error.exit_code)
     else:
         try:
             yield from _check_cameras(cameras, len(wanted.markers), robot, loaded.rig.safety, seen)
         except DeviceError as error:
-            yield Finding("cameras", str(error), error.exit_code)
+            yield Finding("cameras", with_hint(error), error.exit_code)
         finally:
             cameras.close()
     try:
         drives = connect_drives(loaded, robot.cable_names)
     except (DeviceError, InputError) as error:
-        yield Finding(loaded.mounted.plc.called, str(error), error.exit_code)
+        yield Finding(loaded.mounted.plc.called, with_hint(error), error.exit_code)
         return
     try:
         axes = cable_axes(loaded.mounted, robot.cable_names)
@@ -65,7 +65,7 @@ def check_rig(loaded: LoadedRig, robot: Robot, period: float) -> Iterator[Findin
             yield from judged_picture(robot, seen, status)
         yield from readiness(status)
     except DeviceError as error:
-        yield Finding(loaded.mounted.plc.called, str(error), error.exit_code)
+        yield Finding(loaded.mounted.plc.called, with_hint(error), error.exit_code)
     finally:
         drives.close()
 
@@ -142,7 +142,7 @@ def _check_drives(
         share = check_load(drives, period)
         yield Finding("period", f"{1e3 * period:g} ms; the line is busy {100 * share:.0f} % of it")
     except InputError as error:
-        yield Finding("limits", str(error), error.exit_code)
+        yield Finding("limits", with_hint(error), error.exit_code)
     if drives.watchdog is None:
         yield Finding("watchdog", UNWATCHED, NOT_READY)
     yield from drives.checks()

@@ -9,6 +9,7 @@ from tcrctl.errors import DeviceError, InputError
 from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
 from tcrctl.plant.rig.devices import DriveStatus
 from tcrctl.plant.rig.file import LoadedRig
+from tcrctl.plant.rig.finding import with_hint
 from tcrctl.plant.rig.mounting import NO_MARKERS
 
 FIRST_FRAME_S = 0.5
@@ -69,11 +70,11 @@ def rig_status(loaded: LoadedRig, names: tuple[str, ...]) -> RigStatus:
     try:
         drives = connect_drives(loaded, names)
     except (DeviceError, InputError) as error:
-        return RigStatus(loaded.robot, None, {}, cameras, str(error), error.exit_code)
+        return RigStatus(loaded.robot, None, {}, cameras, with_hint(error), error.exit_code)
     try:
         status = drives.status()
     except DeviceError as error:
-        return RigStatus(loaded.robot, None, {}, cameras, str(error), error.exit_code)
+        return RigStatus(loaded.robot, None, {}, cameras, with_hint(error), error.exit_code)
     finally:
         drives.close()
     positions = {name: int(um) / 1e3 for name, um in zip(names, status.position, strict=True)}
@@ -85,7 +86,7 @@ def _cameras(loaded: LoadedRig) -> tuple[dict[str, Any], str, int]:
     try:
         cameras = connect_cameras(loaded, NO_MARKERS)
     except (DeviceError, InputError) as error:
-        return {}, str(error), error.exit_code
+        return {}, with_hint(error), error.exit_code
     try:
         seen = cameras.next(FIRST_FRAME_S, fresh=False)
         told = {
@@ -94,7 +95,7 @@ def _cameras(loaded: LoadedRig) -> tuple[dict[str, Any], str, int]:
             "markers": None if seen is None else cameras.status().markers,
         }
     except DeviceError as error:
-        return {}, str(error), error.exit_code
+        return {}, with_hint(error), error.exit_code
     finally:
         cameras.close()
     return (told, "", 0) if seen else (told, "the cameras send no frames", DeviceError.exit_code)

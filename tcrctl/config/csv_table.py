@@ -66,12 +66,12 @@ class CsvTable:
         return "a quote that is opened here is not closed" if '"' in begins else f"is no table: {error}"
 
     def _check_characters(self) -> None:
-        text = self._text.replace("\r", "\n")
+        text = self._text.replace("\r\n", "\n").replace("\r", "\n")
         shown = visible(text)
         if shown == text:
             return
         at = next(i for i, (a, b) in enumerate(zip(text, shown, strict=False)) if a != b)
-        before = text[:at].splitlines() or [""]
+        before = text[:at].split("\n")
         where = f"{self._name}:{len(before)}:{len(before[-1]) + 1}"
         raise SpecError([Problem(where, "", f"character U+{ord(text[at]):04X} is not allowed in a table")])
 
@@ -79,7 +79,8 @@ class CsvTable:
 def number_in(cell: str) -> float:
     """Return a cell as a number; NaN if it is no finite one."""
     try:
-        value = math.nan if "_" in cell else float(cell)  # 5_0 is a number of Python only
+        # 5_0 and digits of other scripts are numbers of Python only
+        value = float(cell) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:
         return math.nan
     return value if math.isfinite(value) else math.nan

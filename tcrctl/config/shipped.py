@@ -76,7 +76,7 @@ def find_experiment(name_or_path: str) -> Path:
         )
     path = _find("experiment", name_or_path, experiments(), Path())
     if path not in experiments().values():
-        _refuse_other_kinds(path)
+        _refuse_other_kinds(path, "an experiment")
     return path
 
 
@@ -96,27 +96,29 @@ def notes(name: str) -> tuple[str, ...]:
 
 #: Sections that only files of one kind have, what those are, and what they are for.
 _SECTIONS: dict[str, tuple[str, str]] = {
+    "trajectory": ("an experiment", "tcrctl run {}"),
     "modules": ("a robot file", "Name it in an experiment, robot: {}; tcrctl validate --robot {} checks it."),
     "cameras": ("a rig file", "Name it in an experiment, plant: {{kind: rig, rig: {}}}; tcrctl rig check {}"),
     "faults": ("a fault script", "tcrctl emulate --faults {}"),
 }
 
 
-def _refuse_other_kinds(path: Path) -> None:
-    """Raise an InputError that says what a file is, if it is something else than an experiment."""
+def _refuse_other_kinds(path: Path, wanted: str) -> None:
+    """Raise an InputError that says what a file is, if it is something else than what is wanted."""
     from tcrctl.config import strict_yaml
 
     content, shown = strict_yaml.read(path), shlex.quote(str(path))
     if content.startswith(b"\x89MCAP"):
         hint = f"tcrctl run {shlex.quote(str(path.parent))} does the run again; tcrctl info {shown} shows the log."
-        raise InputError(f"{path}: this is a log, not an experiment", hint=hint)
+        raise InputError(f"{path}: this is a log, not {wanted}", hint=hint)
     try:
         keys = _keys_in(content)
     except InputError:
         return  # whoever reads it says what is wrong
-    for section, (kind, use) in _SECTIONS.items():
-        if section in keys and "trajectory" not in keys:
-            raise InputError(f"{path}: this is {kind}, not an experiment", hint=use.replace("{}", shown))
+    found = {kind: use for section, (kind, use) in _SECTIONS.items() if section in keys}
+    if found and wanted not in found:
+        kind, use = next(iter(found.items()))
+        raise InputError(f"{path}: this is {kind}, not {wanted}", hint=use.replace("{}", shown))
 
 
 def find_identification(name_or_path: str) -> Path:
@@ -156,7 +158,10 @@ def find_robot(name_or_path: str, folder: Path | None = None) -> Path:
         UnknownNameError: If there is no shipped robot of that name.
         InputError: If the path leads to no file.
     """
-    return _find("robot", name_or_path, robots(), folder or Path())
+    path = _find("robot", name_or_path, robots(), folder or Path())
+    if path not in robots().values():
+        _refuse_other_kinds(path, "a robot file")
+    return path
 
 
 def find_rig(name_or_path: str, folder: Path | None = None) -> Path:
@@ -171,8 +176,12 @@ def find_rig(name_or_path: str, folder: Path | None = None) -> Path:
         InputError: If the path leads to no file.
     """
     if folder is not None and is_path(name_or_path) and (folder / Path(name_or_path).expanduser()).is_file():
-        return folder / Path(name_or_path).expanduser()
-    return _find("rig", name_or_path, rigs(), Path())
+        path = folder / Path(name_or_path).expanduser()
+    else:
+        path = _find("rig", name_or_path, rigs(), Path())
+    if path not in rigs().values():
+        _refuse_other_kinds(path, "a rig file")
+    return path
 
 
 def is_identification(name_or_path: str) -> bool:

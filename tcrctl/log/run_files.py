@@ -16,9 +16,10 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from tcrctl.config import strict_yaml
 from tcrctl.errors import InputError, TcrctlError
@@ -28,6 +29,9 @@ from tcrctl.log.reader import Log
 
 if TYPE_CHECKING:
     from tcrctl.robot.description import RobotDescription
+
+#: Most characters of a whole number that a run writes: 64 bits and a sign.
+LONGEST_WHOLE: Final = 20
 
 
 class RunFiles:
@@ -110,10 +114,33 @@ class RunFiles:
                 continue
 
 
-def json_map(text: str | bytes) -> dict[str, Any]:
-    """Return the map that a text holds as JSON; empty if it is something else."""
+def json_of(text: str | bytes) -> Any:
+    """Return what a text holds as JSON, so that it can be printed as JSON again and be compared.
+
+    What JSON has no word for (NaN, infinity) and whole numbers that no run writes are null.
+
+    Raises:
+        ValueError: If it holds something else.
+    """
     try:
-        found = json.loads(text)
-    except (ValueError, RecursionError):
+        return json.loads(text, parse_constant=lambda _: None, parse_float=_finite, parse_int=_whole)
+    except RecursionError as error:
+        raise ValueError("nested too deep") from error
+
+
+def _finite(text: str) -> float | None:
+    number = float(text)
+    return number if math.isfinite(number) else None
+
+
+def _whole(text: str) -> int | None:
+    return int(text) if len(text) <= LONGEST_WHOLE else None
+
+
+def json_map(text: str | bytes) -> dict[str, Any]:
+    """Return the map that a text holds as JSON, as ``json_of``; empty if it is something else."""
+    try:
+        found = json_of(text)
+    except ValueError:
         return {}
     return found if isinstance(found, dict) else {}

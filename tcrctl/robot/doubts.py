@@ -18,7 +18,7 @@ _USUAL: Final[dict[str, tuple[float, float, tuple[str, float], tuple[str, float]
     "diameter_mm": (1e-2, 1e3, ("m", 1e3), ("um", 1e-3)),
     "natural_length_mm": (1.0, 1e4, ("m", 1e3), ("um", 1e-3)),
 }
-_MODULE_MASS_G: Final = (0.5, 1e4, ("kg", 1e3), ("mg", 1e-3))
+_MODULE_MASS_G: Final = (0.5, 5e3, ("kg", 1e3), ("mg", 1e-3))
 
 
 def doubts(robot: RobotDescription) -> Iterator[str]:

@@ -37,9 +37,7 @@ class TextTable:
     def markdown(self) -> str:
         """Return the table in Markdown."""
         lines = (self.head, ("---",) * len(self.head), *self.rows)
-        return (
-            "\n".join("| " + " | ".join(c.replace("|", "\\|") for c in line) + " |" for line in lines) + "\n"
-        )
+        return "".join("| " + " | ".join(map(_for_markdown, line)) + " |\n" for line in lines)
 
     def latex(self) -> str:
         """Return the table for LaTeX with the package booktabs."""
@@ -57,6 +55,10 @@ class TextTable:
     def formatted(self, form: Format) -> str:
         """Return the table in one of the formats; Markdown for people."""
         return {"csv": self.csv, "latex": self.latex}.get(form, self.markdown)()
+
+
+def _for_markdown(text: str) -> str:
+    return " ".join(text.splitlines()).replace("|", "\\|")
 
 
 def _for_latex(text: str) -> str:

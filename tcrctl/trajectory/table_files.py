@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +28,13 @@ def read_bytes(path: Path) -> bytes:
         InputError: If it cannot be read, or is too large.
     """
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path}: larger than {MAX_BYTES // 2**20} MiB")
-        return path.read_bytes()
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)  # the size that a file tells may be wrong: /dev/zero has none
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{path}: larger than {MAX_BYTES // 2**20} MiB")
+    return content
 
 
 def columns_of(content: bytes, name: str) -> Columns:
@@ -93,6 +96,8 @@ def _row(row: list[str], header: list[str], where: str, problems: list[Problem])
 
 def _npz(content: bytes, name: str) -> Columns:
     try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            _check_count(sum(member.file_size for member in archive.infolist()) // 8, name)
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:  # a pickle would be a program
             return Columns(name, _vectors({key: arrays[key] for key in arrays.files}, name))
     except InputError:
@@ -107,12 +112,22 @@ def _parquet(content: bytes, name: str) -> Columns:
     except ImportError:
         raise InputError(f"{name}: Parquet needs pyarrow", hint="pip install 'tcrctl[parquet]'") from None
     try:
-        read: Any = parquet.read_table
-        table = read(io.BytesIO(content))
+        opened: Any = parquet.ParquetFile
+        file = opened(io.BytesIO(content))
+        _check_count(file.metadata.num_rows * file.metadata.num_columns, name)
+        table = file.read()
         arrays = {column: table.column(column).to_numpy() for column in table.column_names}
+    except InputError:
+        raise
     except Exception as error:  # whatever pyarrow finds wrong
         raise InputError(f"{name}: is no Parquet file: {error}") from None
     return Columns(name, _vectors(arrays, name))
+
+
+def _check_count(numbers: int, name: str) -> None:
+    """Raise if a file says that it expands to more than may be; a few bytes can stand for gigabytes."""
+    if numbers > MAX_NUMBERS + 1000:  # an archive has headers
+        raise InputError(f"{name}: expands to more than {MAX_NUMBERS} numbers")
 
 
 def _vectors(arrays: dict[str, Array], name: str) -> dict[str, Array]:

@@ -103,3 +103,57 @@ def test_columns_are_results_or_settings_in_every_format(logs, capsys, monkeypat
         "2,kinematic,-",
     ]
     assert main(["runs", str(logs / "nowhere")]) == 2
+
+
+#: What stands in a summary.json that no run wrote.
+UNREADABLE = {
+    "list": "[]",
+    "number": "3",
+    "empty": "",
+    "cut": '{"run_id": "a", ',
+    "no text": b"\xff\xfe",
+    "deep": '{"a":' * 20_000 + "1" + "}" * 20_000,
+    "large": json.dumps({"run_id": "x" * 3_000_000}),
+}
+
+
+def test_results_that_cannot_be_read_are_left_out_and_named(logs, capsys):
+    for name, content in UNREADABLE.items():
+        (logs / name).mkdir()
+        (logs / name / "summary.json").write_bytes(
+            content if isinstance(content, bytes) else content.encode()
+        )
+    assert main(["runs", str(logs), "--json"]) == 0
+    printed = capsys.readouterr()
+    assert [run["seed"] for run in json.loads(printed.out)["runs"]] == [0, 1, 2]
+    assert printed.err.startswith("warning: left out, summary.json cannot be read: ")
+    assert f"{logs / 'cut'}, {logs / 'deep'}, {logs / 'empty'} and 4 more\n" in printed.err
+    assert "paper" not in printed.err  # of something else, and whole
+
+
+def refuse(word):
+    raise AssertionError(f"{word} is no JSON")
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-1e999", "9" * 400])
+def test_numbers_that_json_has_no_word_for_are_none(logs, capsys, number):
+    (logs / "odd").mkdir()
+    given = f'{{"run_id": "odd", "seed": 7, "steps": {number}, "position_error_mm": {{"max": {number}}}}}'
+    (logs / "odd" / "summary.json").write_text(given)
+    assert main(["runs", str(logs), "--sort", "steps", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out, parse_constant=refuse)["runs"]
+    assert [run["steps"] for run in found if run["seed"] == 7] == [None]
+    assert listed(capsys, logs, "--where", "position_error_mm.max>0") == [0, 1]
+    assert main(["runs", str(logs), "--columns", "steps,position_error_mm.max"]) == 0
+
+
+def test_a_row_in_markdown_is_one_line_whatever_a_result_says(logs, capsys):
+    (logs / "odd").mkdir()
+    reason = "two\r\nlines | and \x1b[31ma bar"
+    (logs / "odd" / "summary.json").write_text(json.dumps({"run_id": "odd", "reason": reason}))
+    shown = ["--columns", "run_id,reason", "--format", "markdown"]
+    assert main(["runs", str(logs), "--where", "run_id=odd", *shown]) == 0
+    (row,) = capsys.readouterr().out.splitlines()[2:]
+    assert row.startswith("| odd | two")
+    assert row.count("|") - row.count("\\|") == 3
+    assert row.isprintable()

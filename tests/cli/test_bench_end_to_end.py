@@ -232,5 +232,10 @@ def test_calibration_finds_where_the_cameras_are_and_keeps_the_file_as_it_is(rig
 def test_a_rig_that_does_not_answer_is_exit_code_5(tmp_path, capsys):
     path = tmp_path / "nobody.yaml"
     path.write_text(patient_rig())
-    assert answer(capsys, "rig", "check", str(path), "--robot", "tcr600")[0] == 5
+    code, found = answer(capsys, "rig", "check", str(path), "--robot", "tcr600")
+    silent = {finding["what"]: finding["text"] for finding in found["findings"] if not finding["ok"]}
+    assert (code, set(silent)) == (5, {"cameras", "PLC"})
+    assert all("start it in another terminal: tcrctl emulate" in text for text in silent.values())
+    code, found = answer(capsys, "rig", "status", str(path), "--robot", "tcr600")
+    assert (code, "tcrctl emulate" in found["robots"][0]["trouble"]) == (5, True)
     assert answer(capsys, "rig", "check", str(path), "--dry-run")[0] == 0

@@ -244,3 +244,11 @@ def test_the_module_runs_as_a_program_and_without_colour_off_a_terminal() -> Non
             assert re.fullmatch(
                 rf"tcrctl {re.escape(__version__)}( \(commit [0-9a-f]{{12}}\))?\n", done.stdout
             )
+
+
+@pytest.mark.parametrize("name", ["./nowhere.yaml", "/dev/zero", "."])
+def test_what_cannot_be_validated_is_named_once(name: str, capsys: Output) -> None:
+    assert app.main(["validate", name]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"error: {name}")
+    assert said.count(f"{name}:") == 1

@@ -42,6 +42,37 @@ def test_a_file_of_another_kind_is_recognised(here, capsys, kind, name, use):
         assert printed.err.count("\n") <= 2
 
 
+#: Verbs that want a file of one kind, and a file of another: what it is, what is wanted, what else is said.
+SWAPPED = {
+    "rig check my.yaml --dry-run": (
+        "tcr600",
+        "a robot file",
+        "a rig file",
+        "tcrctl validate --robot my.yaml",
+    ),
+    "emulate my.yaml": ("letter_t", "an experiment", "a rig file", "tcrctl run my.yaml"),
+    "validate --robot my.yaml": ("letter_t", "an experiment", "a robot file", "tcrctl run my.yaml"),
+    "workspace my.yaml": ("loopback", "a rig file", "a robot file", "tcrctl rig check my.yaml"),
+    "run letter_t --dry-run --set robot=my.yaml": (
+        "letter_i",
+        "an experiment",
+        "a robot file",
+        "--set robot: ",
+    ),
+}
+
+
+@pytest.mark.parametrize("line", SWAPPED)
+def test_so_it_is_by_every_verb(here, capsys, line):
+    name, found, wanted, use = SWAPPED[line]
+    shutil.copy((shipped.robots() | shipped.rigs() | shipped.experiments())[name], "my.yaml")
+    code, printed = said(capsys, *line.split())
+    assert code == 2
+    assert f"my.yaml: this is {found}, not {wanted}" in printed.err
+    assert use in printed.err
+    assert printed.err.count("error: ") == 1
+
+
 def test_so_is_a_log_and_a_folder(here, capsys):
     with open_log(here / "log.mcap") as log:
         log.step(records.record(0))
@@ -93,6 +124,7 @@ def test_what_is_to_be_typed_next_can_be_typed(here, capsys):
         ("modules.youngs_modulus_mpa=2.5e9", "Pa"),
         ("springs.youngs_modulus_mpa=9e7", "Pa"),
         ("modules.mass_g=0.01", "kg"),
+        ("modules.mass_g=1e4", "mg"),
         ("modules.ring_diameter_mm=0.07", "m"),
         ("cables.diameter_mm=0.0008", "m"),
         ("springs.natural_length_mm=0.018", "m"),

@@ -50,7 +50,7 @@ def test_a_quote_that_is_not_closed_is_told_with_its_line(tmp_path, rows):
     assert problem(tmp_path, text) == "4:1: a quote that is opened here is not closed"
 
 
-@pytest.mark.parametrize("number", ["6_0", "0x10", "inf", "1e999"])
+@pytest.mark.parametrize("number", ["6_0", "0x10", "inf", "1e999", "\u0661\u0662"])
 def test_numbers_are_those_of_tables(tmp_path, number):
     text = plain().replace("s_shape,60", f"s_shape,{number}")
     assert problem(tmp_path, text) == f"5:1: drive_c1_mm: must be a finite number or empty, not '{number}'"
@@ -58,5 +58,8 @@ def test_numbers_are_those_of_tables(tmp_path, number):
 
 @pytest.mark.parametrize("character", ["\0", "\x1b", "\u202e"])
 def test_characters_that_act_or_hide_are_refused(tmp_path, character):
-    text = plain().replace("bending", f"ben{character}ding")
-    assert problem(tmp_path, text) == f"3:4: character U+{ord(character):04X} is not allowed in a table"
+    for before, column in (("ben", 4), ("", 1)):
+        text = plain().replace("bending", f"{before}{character}ding")
+        said = f"3:{column}: character U+{ord(character):04X} is not allowed in a table"
+        assert problem(tmp_path, text) == said
+        assert problem(tmp_path, text.replace("\n", "\r\n")) == said

@@ -119,7 +119,7 @@ def test_every_figure_is_drawn_for_every_kind_of_run_and_for_several(name, sever
 
 def test_the_command_writes_every_figure(tmp_path, capsys):
     log = str(write(tmp_path / "log.mcap", turning, steps=range(20)))
-    assert main(["plot", log]) == 0
+    assert main(["plot", log, "--width-mm", "88"]) == 0  # small ones are drawn sooner
     printed = capsys.readouterr().out.split()
     shown = [name for name in FIGURES if name not in ("task", "comparison")]  # it has no task, and is one run
     assert printed == [str(tmp_path / "plots" / f"{name}.png") for name in shown]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,6 +20,7 @@ from tcrctl.log.reader import read_log
 from tcrctl.replay.replay import replay
 from tcrctl.robot.robot import build_robot
 from tcrctl.trajectory.table import build_table
+from tcrctl.trajectory.table_files import MAX_NUMBERS, read_bytes
 from tcrctl.trajectory.table_settings import TableSettings
 
 REST = np.array([0.0, 0.0, -0.6])
@@ -171,6 +173,30 @@ def test_a_pickle_in_an_archive_is_not_opened():
     objects = np.array([{}], dtype=object)
     with pytest.raises(InputError, match="is no npz file of numbers"):
         build_table(section(npz_of(t_s=objects), "path.npz"), ROBOT)
+
+
+def packed(form):
+    """A small file that expands to twice the numbers that may be."""
+    zeros, stream = np.zeros(2 * MAX_NUMBERS), io.BytesIO()
+    if form == "npz":
+        np.savez_compressed(stream, t_s=zeros)
+    else:
+        parquet.write_table(pa.table({"t_s": zeros}), stream)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("form", ["npz", "parquet"])
+def test_a_small_file_that_expands_to_a_large_one_is_refused_before_it_does(form):
+    content = packed(form)
+    assert len(content) < 200_000
+    with pytest.raises(InputError, match=f"expands to more than {MAX_NUMBERS} numbers"):
+        build_table(section(content, f"path.{form}"), ROBOT)
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="has no file without an end")
+def test_a_file_without_an_end_is_refused():
+    with pytest.raises(InputError, match="larger than 64 MiB"):
+        read_bytes(Path("/dev/zero"))
 
 
 def test_samples_that_need_too_much_acceleration_are_refused_with_their_time():
