@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import termios
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
@@ -34,6 +35,12 @@ class _Port(_sdk.PortHandler):
 
     def setPacketTimeout(self, length: int) -> None:  # noqa: N802
         self.setPacketTimeoutMillis(self.tx_time_per_byte * length + self._timeout_ms)
+
+    def clearPort(self) -> None:  # noqa: N802
+        try:
+            super().clearPort()
+        except termios.error as error:  # no OSError, but one: the line has been pulled out
+            raise serial.SerialException(str(error)) from error
 
     def readPort(self, length: int) -> bytes:  # noqa: N802
         if not self.ser.in_waiting:
@@ -140,11 +147,12 @@ class DynamixelBus:
         for _ in range(1 + RETRIES):
             try:
                 found = call()
+                if found[1] != _sdk.COMM_SUCCESS:
+                    self._port.clearPort()
             except (OSError, serial.SerialException) as error:
                 raise HardwareError(f"the line is gone: {error}") from error
             if found[1] == _sdk.COMM_SUCCESS:
                 return found
-            self._port.clearPort()
             self._port.is_using = False
         raise HardwareError(f"{who} does not answer: {self._packets.getTxRxResult(found[1])}")
 
