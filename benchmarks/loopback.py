@@ -47,9 +47,12 @@ def main(arguments: list[str]) -> int:
     with tempfile.TemporaryDirectory() as out:
         emulator = subprocess.Popen([*TCRCTL, "emulate", rig], stderr=subprocess.PIPE, text=True)
         try:
-            if emulator.stderr is not None:
-                while "is emulated" not in (line := emulator.stderr.readline()):
-                    print(line, end="", file=sys.stderr)
+            for line in emulator.stderr or ():
+                if "is emulated" in line:
+                    break
+                print(line, end="", file=sys.stderr)
+            else:
+                return 1
             for name in names:
                 for rate in rates:
                     bench = run(name, rate, out, *RIG, "--set", f"plant.rig={rig}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.cli.progress import runs_bar
 
 if TYPE_CHECKING:
     from tcrctl.study.loading import LoadedStudy
@@ -69,17 +70,9 @@ def tune(
 
         study = load_study(name)
         wanted = Search(how.generations, how.population, how.seed, _held_out(study, how.held_out))
-    count = 0
-
-    def told(run: Any, row: Any) -> None:
-        nonlocal count
-        count += 1
-        if not quiet:
-            print(
-                f"[{count}] {', '.join(run.levels.values())}, seed {run.seed}: {row.status}", file=sys.stderr
-            )
-
-    found = search(study, wanted, engine=side.engine, out=out, told=told)
+    total = wanted.runs(len(study.spec.seeds or ()), len(study.spec.experiments))
+    with runs_bar(study.spec.name, total, quiet=quiet) as told:
+        found = search(study, wanted, engine=side.engine, out=out, told=told)
     files = _write(study, found, out)
     if as_json:
         print(json.dumps(_as_json(study, found, files)))
