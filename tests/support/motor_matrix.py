@@ -54,7 +54,7 @@ class WatchedMotors(WatchedEmulators):
         def noting(motor, write):
             def noted(address, data):
                 error = write(address, data)
-                if address == table.GOAL_POSITION.address and motor == AXES[-1] and _followed(motors):
+                if address == table.MOTION.address and motor == AXES[-1] and _followed(motors):
                     self.sent.append(COUNT_UM * (_each(motors, table.GOAL_POSITION) - ZERO))
                 return error
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import dynamixel_sdk
 import serial
 
-from tcr_hardware.dynamixel.table import FIRST_VOLATILE, MODEL, PRESENT_POSITION, Register
+from tcr_hardware.dynamixel.table import FIRST_VOLATILE, MODEL, MOTION, PRESENT_POSITION, Register
 from tcr_hardware.errors import HardwareError
 
 _sdk: Any = dynamixel_sdk  # it has no types
@@ -74,7 +74,7 @@ class DynamixelBus:
     def seconds(self) -> float:
         """Return how long the bytes of one exchange take on the wire [s]."""
         answers = len(self.ids) * (OVERHEAD + self._block.size)
-        questions = 2 * OVERHEAD + len(self.ids) * (2 + 4)
+        questions = 2 * OVERHEAD + len(self.ids) * (2 + MOTION.size)
         return BYTE_BITS * (answers + questions) / self._baud
 
     def read(self, motor: int, register: Register) -> int:
@@ -119,8 +119,9 @@ class DynamixelBus:
             HardwareError: The line is gone.
         """
         group = _sdk.GroupSyncWrite(self._port, self._packets, register.address, register.size)
+        all_bits = (1 << 8 * register.size) - 1
         for motor, value in values.items():
-            group.addParam(motor, list((value & 0xFFFFFFFF).to_bytes(4, "little")[: register.size]))
+            group.addParam(motor, list((value & all_bits).to_bytes(register.size, "little")))
         self._answered("the bus", lambda: (0, group.txPacket(), 0))
 
     def read_all(self) -> dict[int, bytes]:

@@ -116,14 +116,23 @@ class DynamixelMotor:
         """Write bytes; returns the error of the status packet, 0 if they were taken."""
         if address in _READ_ONLY or (address < table.FIRST_VOLATILE and self.get(table.TORQUE_ENABLE)):
             return ACCESS
-        value = int.from_bytes(data, "little", signed=True)
-        if address in _GOALS and self._data[table.BUS_WATCHDOG.address] == table.TRIPPED:
+        written = range(address, address + len(data))
+        if (
+            any(goal in written for goal in _GOALS)
+            and self._data[table.BUS_WATCHDOG.address] == table.TRIPPED
+        ):
             return RANGE
-        low, high = self.get(table.MIN_POSITION), self.get(table.MAX_POSITION)
-        bounded = self.get(table.OPERATING_MODE) == table.Mode.POSITION
-        if address == table.GOAL_POSITION.address and bounded and not low <= value <= high:
+        if table.GOAL_POSITION.address in written and self._beyond(
+            data[table.GOAL_POSITION.address - address :]
+        ):
             return RANGE
-        if address == table.TORQUE_ENABLE.address and value and self.get(table.HARDWARE_ERROR):
+        if address == table.TORQUE_ENABLE.address and any(data) and self.get(table.HARDWARE_ERROR):
             return ACCESS
         self._data[address : address + len(data)] = data
         return 0
+
+    def _beyond(self, goal: bytes) -> bool:
+        """Whether a goal position is outside the limits of its mode."""
+        value = int.from_bytes(goal[: table.GOAL_POSITION.size], "little", signed=True)
+        bounded = self.get(table.OPERATING_MODE) == table.Mode.POSITION
+        return bounded and not self.get(table.MIN_POSITION) <= value <= self.get(table.MAX_POSITION)
