@@ -29,6 +29,8 @@ STILL: Final = 2
 MARGIN: Final = 0.1
 #: Every packet feeds the bus watchdog, so after an exchange motors are only read for this share of its time.
 READABLE: Final = 0.4
+#: A set-point is reached by this factor sooner than the next one is due, which may come a little early.
+SOONER: Final = 1.1
 
 
 class DynamixelDrives:
@@ -68,6 +70,7 @@ class DynamixelDrives:
             "Dynamixel bus", self._where, f"models {models}, watchdog {told['watchdog']}", told
         )
         self._last, self._exchanged = self._read(), -math.inf
+        self._sent = self._last.position
         self._reset_seen = self._zero_seen = self._stopping = False
         self._reject = ""
 
@@ -152,7 +155,9 @@ class DynamixelDrives:
     def _hold(self) -> None:
         """Make the present positions the goals."""
         data = self._call(self._bus.read_all)
-        self._all(table.GOAL_POSITION, {m: signed(data[m], table.PRESENT_POSITION) for m in self._ids})
+        counts = {motor: signed(data[motor], table.PRESENT_POSITION) for motor in self._ids}
+        self._all(table.GOAL_POSITION, counts)
+        self._sent = self._lengths(np.array(list(counts.values())))
 
     def _stop(self) -> None:
         if not self._stopping:
@@ -176,12 +181,13 @@ class DynamixelDrives:
             whole = (1 << 8 * table.GOAL_POSITION.size) - 1
             below = 8 * table.PROFILE_VELOCITY.size
             self._all(table.MOTION, {m: velocity | (goal & whole) << below for m, velocity, goal in motions})
+            self._sent = target
 
     def _velocities(self, target: NDArray[np.int64]) -> list[int]:
         """Return profile velocities that reach set-points in a period: motors that dash and wait shake robots."""
         if self._period is None:
             return self._fastest
-        speeds = np.abs(target - self._last.position) / self._period  # [um/s]
+        speeds = SOONER * np.abs(target - self._sent) / self._period  # [um/s]
         units = np.ceil(speeds / self._velocity_unit).astype(int)
         return [int(value) for value in np.clip(units, 1, self._fastest)]
 
