@@ -65,24 +65,24 @@ def _assumed(changes: Sequence[str]) -> SelfCalibrationSpec:
 
 
 def _print(result: CalibrationResult) -> None:
+    from tcrctl.cli.table import print_facts
+
     print(f"{result.rests} rests, {len(result.unknowns)} unknowns, {result.fit.iterations} steps")
-    rows = (
-        ("as described", result.before),
-        ("found", result.after),
-        ("held out, as described", result.held_out_before),
-        ("held out, found from the others", result.held_out),
-    )
-    for what, errors in rows:
-        print(f"  {what:<32} {_distances(errors)}")
+    rows = [
+        ("as described", _distances(result.before)),
+        ("found", _distances(result.after)),
+        ("held out, as described", _distances(result.held_out_before)),
+        ("held out, found from the others", _distances(result.held_out)),
+    ]
     for name, entry in result.values().items():
         if name.split(".")[0] in SHOWN:
-            print(f"  {name:<24} {entry['value']:>9.4f} +- {entry['std']:.4f} {_unit(entry)}")
+            rows.append((name, f"{entry['value']:.4f} +- {entry['std']:.4f} {_unit(entry)}".rstrip()))
     if result.rubbing.coefficient.size:
-        said = ", ".join(f"{mu:.3f}" for mu in result.rubbing.coefficient)
-        print(f"  friction {said}")
-    print(f"  drives: lag {1e3 * result.drives.lag:.1f} ms, dead time {1e3 * result.drives.dead_time:.1f} ms")
-    for sentence in (*result.undetermined, *result.moving_together):
-        print(f"  not told: {sentence}")
+        rows.append(("friction", ", ".join(f"{mu:.3f}" for mu in result.rubbing.coefficient)))
+    drives = result.drives
+    rows.append(("drives", f"lag {1e3 * drives.lag:.1f} ms, dead time {1e3 * drives.dead_time:.1f} ms"))
+    rows += [("not told", sentence) for sentence in (*result.undetermined, *result.moving_together)]
+    print_facts((name, text, "") for name, text in rows)
 
 
 #: Groups that are printed one by one; all are in the report.
