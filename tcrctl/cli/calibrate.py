@@ -11,23 +11,24 @@ from typing import TYPE_CHECKING, Any
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from tcrctl.cli.identify import Shown
     from tcrctl.identify.calibration.result import CalibrationResult, Errors
     from tcrctl.identify.calibration.settings import SelfCalibrationSpec
 
 Say = Callable[[str], None]
 
 
-def calibrate_log(log: str, changes: Sequence[str], out: Path, say: Say, shown: Shown) -> int:
+def calibrate_log(
+    log: str, changes: Sequence[str], out: Path, say: Say, as_json: bool, *, quiet: bool
+) -> int:
     """Find robot, cameras and drives of a log; return the exit code."""
     from tcrctl.experiment.run_folder import log_in
     from tcrctl.identify.calibration.files import write_calibration
     from tcrctl.identify.calibration.self_calibration import calibrate
 
-    with progress_bar("steps", shown=not shown.quiet) as progress:
+    with progress_bar("steps", shown=not quiet) as progress:
         found = calibrate(log_in(Path(log)), _assumed(changes), say, progress)
     robot, calibration = write_calibration(found, out)
-    if shown.as_json:
+    if as_json:
         print(json.dumps(found.result.as_json(robot, calibration)))
     else:
         _print(found.result)
@@ -37,13 +38,15 @@ def calibrate_log(log: str, changes: Sequence[str], out: Path, say: Say, shown: 
     return 0 if found.result.fit.converged else 1
 
 
-def design_poses(name: str, changes: Sequence[str], out: Path, say: Say, shown: Shown) -> int:
+def design_poses(
+    name: str, changes: Sequence[str], out: Path, say: Say, as_json: bool, *, quiet: bool
+) -> int:
     """Choose the poses of an excitation and write it; return the exit code."""
     from tcrctl.identify.calibration.designed import design_excitation
 
-    with progress_bar("candidates", shown=not shown.quiet) as progress:
+    with progress_bar("candidates", shown=not quiet) as progress:
         designed = design_excitation(name, _assumed(changes), out, say, progress)
-    if shown.as_json:
+    if as_json:
         print(json.dumps(designed.as_json()))
     else:
         print(

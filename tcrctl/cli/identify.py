@@ -171,8 +171,8 @@ def _instead(
     if inputs or told != Told() or (instead.calibrate and instead.design):
         raise InputError("--calibrate and --design stand alone", hint="See: tcrctl identify --help")
     if instead.calibrate:
-        return calibrate_log(instead.calibrate, changes, out, say, shown)
-    return design_poses(instead.design or "", changes, out, say, shown)
+        return calibrate_log(instead.calibrate, changes, out, say, shown.as_json, quiet=shown.quiet)
+    return design_poses(instead.design or "", changes, out, say, shown.as_json, quiet=shown.quiet)
 
 
 def _assignments(changed: Changed) -> list[str]:
