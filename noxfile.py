@@ -4,6 +4,7 @@ nox -s lint types fast        # before every commit
 nox -s test -- -k replay      # what stands after -- goes to pytest
 nox -s thorough               # all tests, those too that are left out by default, with more examples
 nox -s docs                   # build the documentation site with all its figures, in build/site
+nox -s typed                  # type the commands of every document
 nox -s examples               # install the packages in examples/ and run their tests
 nox -s pictures bench         # draw the pictures of the documents again, print the tables of cost
 nox -s pin                    # write constraints.txt anew
@@ -64,6 +65,12 @@ def docs(session: nox.Session) -> None:
         "python", "-m", "pytest", "-n", "0", "tests/test_documents.py", "tests/test_shown_commands.py"
     )
     session.run("python", "docs/site/build.py", "build/site", "--figures", "build/figures")
+
+
+@nox.session
+def typed(session: nox.Session) -> None:
+    """Type the commands of every document; a quarter of an hour, on a computer that has time for a bench."""
+    session.run("python", "-m", "pytest", "-n", "0", "docs/tests", *session.posargs)
 
 
 @nox.session

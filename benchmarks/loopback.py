@@ -2,6 +2,8 @@
 
     python benchmarks/loopback.py                # letter_t, fixed_point_rotation at 20 and 100 Hz, 8 minutes
     python benchmarks/loopback.py letter_t 100   # one experiment, one rate
+    python benchmarks/loopback.py --rig dynamixel_loopback letter_t 20
+    chrt -f 10 python benchmarks/loopback.py     # on a computer that is busy, where real-time priority is allowed
 
 Needs a computer that is not busy: cameras, PLCs, two robots and the controller share it, in real time. On a bench
 the error is that of the estimate, as nobody knows more.
@@ -16,7 +18,7 @@ import tempfile
 from typing import Any
 
 TCRCTL = [sys.executable, "-m", "tcrctl.cli.app"]
-RIG = ["--set", "plant.kind=rig", "--set", "plant.rig=loopback", "--yes"]
+RIG = ["--set", "plant.kind=rig", "--yes"]
 ERROR_FACTOR, P50_MS, P99_MS = 2.0, 4.0, 20.0
 
 
@@ -32,6 +34,9 @@ def run(name: str, rate: float, out: str, *options: str) -> dict[str, Any]:
 
 def main(arguments: list[str]) -> int:
     """Print the table; return how many rows are not as they must be."""
+    rig = "loopback"
+    if arguments[:1] == ["--rig"]:
+        rig, arguments = arguments[1], arguments[2:]
     names = arguments[:1] or ["letter_t", "fixed_point_rotation"]
     rates = [float(rate) for rate in arguments[1:]] or [20.0, 100.0]
     bad = 0
@@ -40,14 +45,17 @@ def main(arguments: list[str]) -> int:
     )
     print("|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as out:
-        emulator = subprocess.Popen([*TCRCTL, "emulate"], stderr=subprocess.PIPE, text=True)
+        emulator = subprocess.Popen([*TCRCTL, "emulate", rig], stderr=subprocess.PIPE, text=True)
         try:
-            if emulator.stderr is not None:
-                while "is emulated" not in (line := emulator.stderr.readline()):
-                    print(line, end="", file=sys.stderr)
+            for line in emulator.stderr or ():
+                if "is emulated" in line:
+                    break
+                print(line, end="", file=sys.stderr)
+            else:
+                return 1
             for name in names:
                 for rate in rates:
-                    bench = run(name, rate, out, *RIG)
+                    bench = run(name, rate, out, *RIG, "--set", f"plant.rig={rig}")
                     bad += not _row(name, rate, bench, run(name, rate, out))
         finally:
             emulator.terminate()

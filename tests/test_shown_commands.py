@@ -11,6 +11,7 @@ import pytest
 import typer
 
 from support.shown_commands import blocks, shown, with_files
+from support.typed_commands import is_quick, put_files, shortened, why_not
 from tcrctl.cli.app import VERBS, build_app, main
 from tcrctl.cli.rig.verbs import RIG_VERBS
 from tcrctl.config import shipped
@@ -19,6 +20,8 @@ from tcrctl.errors import InputError
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("docs", "examples", "hardware")
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(path for name in FOLDERS for path in (ROOT / name).rglob("*.md"))])
+#: Pages that are typed whole.
+TYPED = ("start.md", "robot.md")
 #: Exit codes that a page tells its reader to expect.
 EXPECTED = {"diff": 3}
 ALL = [
@@ -139,6 +142,24 @@ def test_the_guide_to_a_robot_of_ones_own_works_as_it_stands(folder, capsys):
     told = capsys.readouterr().out
     assert "tensions [N]" in told
     assert "vibrations [Hz]" in told
+
+
+@pytest.mark.slow
+def test_every_shown_command_that_takes_no_time_works(folder, capsys):
+    """The others: ``nox -s typed``, which takes its time."""
+    put_files(folder)
+    typed, wrong = set(), []
+    for document in DOCUMENTS:
+        if document.name in TYPED:
+            continue
+        for arguments in shown(document.read_text()):
+            if is_quick(arguments) and not why_not(arguments) and tuple(arguments) not in typed:
+                typed.add(tuple(arguments))
+                code = main(shortened(arguments))
+                said = capsys.readouterr()
+                wrong += [(arguments, code, said.err)] if code else []
+    assert wrong == []
+    assert len(typed) >= 8
 
 
 @pytest.mark.slow

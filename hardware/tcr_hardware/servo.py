@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,18 @@ class ServoSettings:
     count_um: float = 0.0
     radius_error: float = 0.0
     zero_error_um: float = 0.0
+
+
+def in_unit(settings: ServoSettings, unit: float) -> ServoSettings:
+    """Return settings whose lengths are counted in units of so many micrometres; encoder counts are left out."""
+    return replace(
+        settings,
+        speed_um_s=settings.speed_um_s / unit,
+        acceleration_um_s2=settings.acceleration_um_s2 / unit,
+        backlash_um=settings.backlash_um / unit,
+        count_um=0.0,
+        zero_error_um=settings.zero_error_um / unit,
+    )
 
 
 class DeadTime:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tcrctl.cli.progress import progress_bar
+
 if TYPE_CHECKING:
     from tcrctl.identify.calibration.result import CalibrationResult, Errors
     from tcrctl.identify.calibration.settings import SelfCalibrationSpec
@@ -15,13 +17,16 @@ if TYPE_CHECKING:
 Say = Callable[[str], None]
 
 
-def calibrate_log(log: str, changes: Sequence[str], out: Path, say: Say, as_json: bool) -> int:
+def calibrate_log(
+    log: str, changes: Sequence[str], out: Path, say: Say, as_json: bool, *, quiet: bool
+) -> int:
     """Find robot, cameras and drives of a log; return the exit code."""
     from tcrctl.experiment.run_folder import log_in
     from tcrctl.identify.calibration.files import write_calibration
     from tcrctl.identify.calibration.self_calibration import calibrate
 
-    found = calibrate(log_in(Path(log)), _assumed(changes), say)
+    with progress_bar("steps", shown=not quiet) as progress:
+        found = calibrate(log_in(Path(log)), _assumed(changes), say, progress)
     robot, calibration = write_calibration(found, out)
     if as_json:
         print(json.dumps(found.result.as_json(robot, calibration)))
@@ -33,11 +38,14 @@ def calibrate_log(log: str, changes: Sequence[str], out: Path, say: Say, as_json
     return 0 if found.result.fit.converged else 1
 
 
-def design_poses(name: str, changes: Sequence[str], out: Path, say: Say, as_json: bool) -> int:
+def design_poses(
+    name: str, changes: Sequence[str], out: Path, say: Say, as_json: bool, *, quiet: bool
+) -> int:
     """Choose the poses of an excitation and write it; return the exit code."""
     from tcrctl.identify.calibration.designed import design_excitation
 
-    designed = design_excitation(name, _assumed(changes), out, say)
+    with progress_bar("candidates", shown=not quiet) as progress:
+        designed = design_excitation(name, _assumed(changes), out, say, progress)
     if as_json:
         print(json.dumps(designed.as_json()))
     else:
@@ -60,24 +68,24 @@ def _assumed(changes: Sequence[str]) -> SelfCalibrationSpec:
 
 
 def _print(result: CalibrationResult) -> None:
+    from tcrctl.cli.table import print_facts
+
     print(f"{result.rests} rests, {len(result.unknowns)} unknowns, {result.fit.iterations} steps")
-    rows = (
-        ("as described", result.before),
-        ("found", result.after),
-        ("held out, as described", result.held_out_before),
-        ("held out, found from the others", result.held_out),
-    )
-    for what, errors in rows:
-        print(f"  {what:<32} {_distances(errors)}")
+    rows = [
+        ("as described", _distances(result.before)),
+        ("found", _distances(result.after)),
+        ("held out, as described", _distances(result.held_out_before)),
+        ("held out, found from the others", _distances(result.held_out)),
+    ]
     for name, entry in result.values().items():
         if name.split(".")[0] in SHOWN:
-            print(f"  {name:<24} {entry['value']:>9.4f} +- {entry['std']:.4f} {_unit(entry)}")
+            rows.append((name, f"{entry['value']:.4f} +- {entry['std']:.4f} {_unit(entry)}".rstrip()))
     if result.rubbing.coefficient.size:
-        said = ", ".join(f"{mu:.3f}" for mu in result.rubbing.coefficient)
-        print(f"  friction {said}")
-    print(f"  drives: lag {1e3 * result.drives.lag:.1f} ms, dead time {1e3 * result.drives.dead_time:.1f} ms")
-    for sentence in (*result.undetermined, *result.moving_together):
-        print(f"  not told: {sentence}")
+        rows.append(("friction", ", ".join(f"{mu:.3f}" for mu in result.rubbing.coefficient)))
+    drives = result.drives
+    rows.append(("drives", f"lag {1e3 * drives.lag:.1f} ms, dead time {1e3 * drives.dead_time:.1f} ms"))
+    rows += [("not told", sentence) for sentence in (*result.undetermined, *result.moving_together)]
+    print_facts((name, text, "") for name, text in rows)
 
 
 #: Groups that are printed one by one; all are in the report.

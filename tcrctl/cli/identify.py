@@ -16,6 +16,7 @@ from tcrctl.cli.console import console
 from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, SideBySide, unfolded
 
 if TYPE_CHECKING:
+    from tcrctl.identify.identification import Progress
     from tcrctl.identify.loading import LoadedIdentification
     from tcrctl.identify.result import Result
 
@@ -133,7 +134,7 @@ def identify(
 
         check_writable(out)
         if instead.calibrate or instead.design:
-            raise typer.Exit(_instead(inputs or [], told, instead, changes, out, say, shown.as_json))
+            raise typer.Exit(_instead(inputs or [], told, instead, changes, out, say, shown))
         loaded = _loaded(inputs or [], told, changes)
         say(_headline(loaded))
         from tcrctl.identify.identification import identify as find
@@ -162,7 +163,7 @@ def _instead(
     changes: list[str],
     out: Path,
     say: Callable[[str], None],
-    as_json: bool,
+    shown: Shown,
 ) -> int:
     from tcrctl.cli.calibrate import calibrate_log, design_poses
     from tcrctl.errors import InputError
@@ -170,8 +171,8 @@ def _instead(
     if inputs or told != Told() or (instead.calibrate and instead.design):
         raise InputError("--calibrate and --design stand alone", hint="See: tcrctl identify --help")
     if instead.calibrate:
-        return calibrate_log(instead.calibrate, changes, out, say, as_json)
-    return design_poses(instead.design or "", changes, out, say, as_json)
+        return calibrate_log(instead.calibrate, changes, out, say, shown.as_json, quiet=shown.quiet)
+    return design_poses(instead.design or "", changes, out, say, shown.as_json, quiet=shown.quiet)
 
 
 def _assignments(changed: Changed) -> list[str]:
@@ -240,23 +241,32 @@ def _say(text: str) -> None:
 
 
 @contextmanager
-def _progress_line(*, shown: bool) -> Iterator[Callable[[str, int, float], None]]:
-    """Show what is being done, evaluations per second and the best error, on stderr if that is a terminal."""
+def _progress_line(*, shown: bool) -> Iterator[Progress]:
+    """Show what is being done, evaluations per second and the best error, on stderr if that is a terminal.
+
+    The time that is left is that of the method under way, and the longest: it ends when nothing gets better.
+    """
     if not (shown and sys.stderr.isatty()):
-        yield lambda what, evaluations, best_mm: None
+        yield lambda what, evaluations, best_mm, most: None
         return
     import time
 
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich import progress
 
     begin = time.perf_counter()
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console(stderr=True), transient=True) as bar:
+    columns = (
+        progress.SpinnerColumn(),
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(bar_width=12),
+        progress.TimeElapsedColumn(),
+        progress.TimeRemainingColumn(),
+    )
+    with progress.Progress(*columns, console=console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading data", total=None)
 
-        def show(what: str, evaluations: int, best_mm: float) -> None:
+        def show(what: str, evaluations: int, best_mm: float, most: int | None) -> None:
             rate = evaluations / max(time.perf_counter() - begin, 1e-9)
             text = f"{what}: {evaluations} evaluations, {rate:.1f}/s, best {best_mm:.4g} mm"
-            bar.update(task, description=text)
+            bar.update(task, description=text, completed=evaluations, total=most)
 
         yield show

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,13 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.cli.progress import runs_bar
 
 if TYPE_CHECKING:
     from tcrctl.study.loading import LoadedStudy
     from tcrctl.study.plan import PlannedRun
-    from tcrctl.study.row import Row
-
-    Told = Callable[[PlannedRun, Row], None]
 
 Name = Annotated[
     str, typer.Argument(metavar="STUDY|SPEC", help="Study or experiment: shipped, or path of a YAML file.")
@@ -122,7 +117,7 @@ def sweep(
             _print_plan(study, runs, manner.out, side.engine.jobs, as_json=as_json)
             return
         from tcrctl.study.sweep import sweep as run_study
-    with _progress(study.spec.name, len(runs), quiet=shown.quiet) as told:
+    with runs_bar(study.spec.name, len(runs), quiet=shown.quiet) as told:
         result = run_study(
             study,
             runs,
@@ -194,27 +189,3 @@ def _print_plan(study: LoadedStudy, runs: list[PlannedRun], out: Path, jobs: int
 
     print_table(plan.titles, plan.rows())
     print(plan.sentence)
-
-
-@contextmanager
-def _progress(name: str, total: int, *, quiet: bool) -> Iterator[Told]:
-    """Show a bar on a terminal; elsewhere a line for every run."""
-    from tcrctl.cli.progress import progress_bar
-
-    count = 0
-    with progress_bar(name, shown=not quiet) as bar:
-
-        def told(run: PlannedRun, row: Row) -> None:
-            nonlocal count
-            count += 1
-            bar(count, total)
-            if not quiet and not sys.stderr.isatty():
-                levels = ", ".join(run.levels.values())
-                end = f"{row.status}{': ' if row.reason else ''}{row.reason}"
-                print(
-                    f"[{count}] {levels}, seed {run.seed}: {end}, {row.seconds:.0f} s",
-                    file=sys.stderr,
-                    flush=True,
-                )
-
-        yield told

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.cli.progress import runs_bar
 
 if TYPE_CHECKING:
     from tcrctl.study.loading import LoadedStudy
@@ -69,17 +70,9 @@ def tune(
 
         study = load_study(name)
         wanted = Search(how.generations, how.population, how.seed, _held_out(study, how.held_out))
-    count = 0
-
-    def told(run: Any, row: Any) -> None:
-        nonlocal count
-        count += 1
-        if not quiet:
-            print(
-                f"[{count}] {', '.join(run.levels.values())}, seed {run.seed}: {row.status}", file=sys.stderr
-            )
-
-    found = search(study, wanted, engine=side.engine, out=out, told=told)
+    total = wanted.runs(len(study.spec.seeds or ()), len(study.spec.experiments))
+    with runs_bar(study.spec.name, total, quiet=quiet) as told:
+        found = search(study, wanted, engine=side.engine, out=out, told=told)
     files = _write(study, found, out)
     if as_json:
         print(json.dumps(_as_json(study, found, files)))
@@ -133,19 +126,26 @@ def _as_json(study: LoadedStudy, found: Tuned, files: list[Path]) -> dict[str, A
 
 
 def _print(found: Tuned, files: list[Path]) -> None:
+    from tcrctl.cli.table import print_facts, print_table
     from tcrctl.study.groups import differences, groups
     from tcrctl.study.text import difference_table, group_table
 
-    for key, value in found.settings.items():
-        print(f"{key}: {value}")
-    print(f"worst decile, of the usual error: {found.before:.3g} -> {found.after:.3g} on the plants tuned on")
-    print(
-        f"                                  {found.held_out_before:.3g} -> {found.held_out_after:.3g} on others"
-    )
-    print(group_table(groups(found.judging, found.runs)).markdown())
+    facts = [(key, str(value), "") for key, value in found.settings.items()]
+    facts += [
+        ("worst decile", f"{found.before:.3g} -> {found.after:.3g} on the plants tuned on", ""),
+        (
+            "",
+            f"{found.held_out_before:.3g} -> {found.held_out_after:.3g} on others; 1 is the usual error",
+            "",
+        ),
+    ]
+    print_facts(facts)
+    tables = [group_table(groups(found.judging, found.runs))]
     pairs = differences(found.judging, found.runs)
-    if pairs:
-        print(difference_table(pairs, "case", "shipped").markdown())
+    tables += [difference_table(pairs, "case", "shipped")] if pairs else []
+    for table in tables:
+        print()
+        print_table(table.head, table.rows)
     if files:
         print("\n".join(map(str, files)))
     elif not found.unanswered:

@@ -53,9 +53,9 @@ def zero_rig(
             drives, before, DriveControl(permit=True, zero=True), lambda s: s.zeroed and _at_zero(s)
         )
         if after is None:
-            supervisor.end_zeroing("the PLC did not confirm")
-            raise DeviceError(f"the PLC did not confirm tension-zero within {PATIENCE:g} s")
-        supervisor.end_zeroing("confirmed by the PLC")
+            supervisor.end_zeroing("the drives did not confirm")
+            raise DeviceError(f"the drives did not confirm tension-zero within {PATIENCE:g} s")
+        supervisor.end_zeroing("confirmed by the drives")
         return {**result, "after_mm": _positions(names, after), "zeroed": after.zeroed}
     finally:
         drives.close()
@@ -88,7 +88,7 @@ def reset_rig(
             raise ArmingRefusedError(reasons)
         after = _edge(drives, before, DriveControl(reset=True), lambda s: not (s.fault or s.watchdog))
         if after is None:
-            raise DeviceError(f"the PLC keeps its fault: {fault}", hint="Its cause may still be there.")
+            raise DeviceError(f"the drives keep their fault: {fault}", hint="Its cause may still be there.")
         operation.report("rig", "info", f"fault cleared: {fault}")
         return {"fault": fault, "cleared": True}
     finally:
@@ -100,7 +100,7 @@ def _standing_still(drives: Drives, operation: Operation, *, dry_run: bool) -> D
     time.sleep(5 * CYCLE)
     status = drives.status()
     reasons = ["the emergency stop is pressed"] if status.estop else []
-    reasons += [f"the PLC reports a fault: {status.fault}"] if status.fault else []
+    reasons += [f"the drives report a fault: {status.fault}"] if status.fault else []
     reasons += ["a drive is moving"] if abs(status.position - first.position).max() > STILL else []
     reasons += ["the drives are enabled by somebody else"] if status.enabled else []
     reasons += [] if operation.confirmed or dry_run else ["the operator has not agreed (--yes)"]

@@ -34,7 +34,9 @@ def emulated_drives(
     plc = mounted.plc
     if isinstance(plc, Dynamixel):
         try:
-            return EmulatedWinches(plc, tuple(cable.axis for cable in mounted.cables.values()))
+            axes = tuple(cable.axis for cable in mounted.cables.values())
+            servos = () if real.plant.drives is None else real.servos(mounted, max(axes))
+            return EmulatedWinches(plc, axes, servos)
         except HardwareError as error:
             raise DeviceError(f"Dynamixel motors cannot be emulated: {error}", hint=error.hint) from error
     return PlcEmulator(_plc_settings(plc.unit, mounted, settings, real))

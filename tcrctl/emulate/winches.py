@@ -8,44 +8,12 @@ from typing import Final
 from tcr_hardware.dynamixel import table
 from tcr_hardware.emulators.dynamixel import DynamixelEmulator
 from tcr_hardware.modbus.registers import Status
-from tcrctl.errors import InputError
+from tcr_hardware.servo import ServoSettings, in_unit
+from tcrctl.emulate.winch_faults import WinchFaults
 from tcrctl.plant.rig.settings import Dynamixel
 
 #: Where the horns stand before the homing offset [counts]: it is not 0, so tension-zero is known.
 OFFSET: Final = 100
-#: Faults of a script that motors can have.
-FAULTS: Final = ("silence", "corrupt", "drive")
-
-
-class WinchFaults:
-    """Takes the faults of a script."""
-
-    def __init__(self, bus: DynamixelEmulator) -> None:
-        self._bus = bus
-
-    def set(self, name: str, **arguments: float | None) -> None:
-        """Let a fault begin.
-
-        Raises:
-            InputError: If motors have no such fault.
-        """
-        del arguments
-        if name not in FAULTS:
-            raise InputError(f"emulated Dynamixel motors have no fault {name}; they have {', '.join(FAULTS)}")
-        self._change(name, wrong=True)
-
-    def clear(self, name: str | None = None) -> None:
-        """Let a fault end, or all; a motor that has shut down stays so."""
-        for each in FAULTS if name is None else (name,):
-            self._change(each, wrong=False)
-
-    def _change(self, name: str, *, wrong: bool) -> None:
-        if name == "silence":
-            self._bus.silent = wrong
-        elif name == "corrupt":
-            self._bus.corrupt = 10**9 if wrong else 0
-        elif wrong:
-            self._bus.fail(min(self._bus.motors), table.HardwareFault.OVERLOAD)
 
 
 class EmulatedWinches:
@@ -56,18 +24,22 @@ class EmulatedWinches:
         faults: What is wrong with it.
     """
 
-    def __init__(self, settings: Dynamixel, axes: tuple[int, ...]) -> None:
+    def __init__(
+        self, settings: Dynamixel, axes: tuple[int, ...], servos: tuple[ServoSettings, ...] = ()
+    ) -> None:
         """Build the bus.
 
         Args:
             settings: Section of the rig file.
             axes: Numbers of the motors.
+            servos: How imperfect the drives are, the one with number 1 first; ideal if left out.
         """
         mode = table.Mode.POSITION if settings.current_limit_ma is None else table.Mode.CURRENT_POSITION
         self._start = settings.zero_tick - OFFSET
         self._count = 1e3 * settings.mm_per_turn / table.TURN
         self._axes = axes
-        self.bus = DynamixelEmulator(dict.fromkeys(axes, self._start), mode=mode)
+        loops = {axis: in_unit(servos[axis - 1], self._count) for axis in axes} if servos else None
+        self.bus = DynamixelEmulator(dict.fromkeys(axes, self._start), mode=mode, servos=loops)
         for motor in self.bus.motors.values():
             motor.write(table.HOMING_OFFSET.address, OFFSET.to_bytes(4, "little"))
             motor.write(table.GOAL_POSITION.address, settings.zero_tick.to_bytes(4, "little"))
@@ -75,9 +47,8 @@ class EmulatedWinches:
 
     def positions_um(self) -> tuple[float, ...]:
         """Return the cable taken in by every motor (largest number,) [um], 0 where there is none."""
-        turns = self.bus.turns()
-        numbers = range(1, max(self._axes) + 1)
-        return tuple(self._count * (turns.get(n, self._start) - self._start) for n in numbers)
+        wound = self.bus.wound()
+        return tuple(self._count * wound.get(number, 0.0) for number in range(1, max(self._axes) + 1))
 
     def set_tensions(self, newtons: object) -> None:
         """Take no notice: these motors are strong."""

@@ -33,14 +33,14 @@ FORCE_STEP = 1e-3
 AT_BOUND = 1e-3
 
 Notify = Callable[[str], None]
-Progress = Callable[[str, int, float], None]
+Progress = Callable[[str, int, float, int | None], None]
 
 
 def silent(text: str) -> None:
     """Discard a message for the user."""
 
 
-def no_progress(what: str, evaluations: int, best_mm: float) -> None:
+def no_progress(what: str, evaluations: int, best_mm: float, most: int | None) -> None:
     """Show nothing."""
 
 
@@ -57,6 +57,7 @@ class Work:
         best: Best answer so far.
         stages: Methods done.
         doing: What is being done, for the progress display.
+        most: Evaluations after which that will have ended at the latest; None if nobody knows.
     """
 
     loaded: LoadedIdentification
@@ -67,6 +68,7 @@ class Work:
     best: Best
     stages: list[Stage] = field(default_factory=list)
     doing: str = ""
+    most: int | None = None
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -93,7 +95,8 @@ def identify(
         loaded: What is to be done.
         engine: Where the model is evaluated; on the cores of this machine if None.
         notify: Takes messages for the user.
-        progress: Takes what is being done, the number of evaluations and the best mean error [mm] so far.
+        progress: Takes what is being done, the number of evaluations and the best mean error [mm] so far, and the
+            number at which that ends at the latest; None if nobody knows.
 
     Raises:
         InputError: If data, robot and parameters do not go together.
@@ -108,14 +111,14 @@ def identify(
     interruption = Interruption()
     evaluator = Evaluator(regression, engine or Engine(physical_cores()), interruption.check)
     work = Work(loaded, regression, predicted, frame, evaluator, best)
-    evaluator.progress = lambda count: progress(work.doing, count, _shown(work))
+    evaluator.progress = lambda count: progress(work.doing, count, _shown(work), work.most)
     held_out = np.full(len(regression.group_names), np.nan)
     judged = None
     failure = None
     with interruption, evaluator:
         try:
             _search(work)
-            work.doing = "certainty"
+            work.doing, work.most = "certainty", None
             answer = np.concatenate([best.x, best.frame.unknowns])
             residuals = Residuals(evaluator, best.frame, work.used, Best.none(best.x, best.frame))
             judged = _judge(work, residuals, answer)
@@ -133,7 +136,9 @@ def _search(work: Work) -> None:
     for method in spec.method.split("+"):
         work.doing = method
         begin, before = time.perf_counter(), work.evaluator.evaluations
+        work.most = None
         if method == "pso":
+            work.most = before + spec.pso.particles * spec.pso.iterations
             search(work.evaluator, work.frame, work.best.x, spec.pso, spec.seed, work.best)
         else:
             polish(work.evaluator, work.used, work.best)

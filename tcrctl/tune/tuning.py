@@ -51,6 +51,11 @@ class Search:
     seed: int
     held_out: tuple[int, ...]
 
+    def runs(self, plants: int, experiments: int) -> int:
+        """Return how many runs a whole search over so many plants and experiments takes."""
+        candidates = 1 + self.generations * self.population
+        return experiments * (plants * candidates + 2 * len(self.held_out))
+
 
 @dataclass(frozen=True, slots=True)
 class Tuned:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
+from support import short_runs
 from support.loopback import PATIENT, free_ports
+from support.punctual import on_a_punctual_computer
 from support.short_runs import SHORT
+from tcr_hardware.dynamixel import table
 from tcrctl.commissioning.check import check_rig
 from tcrctl.commissioning.jog import Jog, jog_rig
-from tcrctl.commissioning.zero import zero_rig
+from tcrctl.commissioning.zero import reset_rig, zero_rig
 from tcrctl.config import shipped
 from tcrctl.emulate.bench import EmulatedBench
 from tcrctl.emulate.settings import EmulationSettings
-from tcrctl.errors import InputError
+from tcrctl.errors import ArmingRefusedError, InputError
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.spec import load_spec
@@ -26,6 +31,8 @@ from tcrctl.robot.description import load_robot
 pytestmark = pytest.mark.slow
 
 NAMES = ("c1", "c2", "c3")
+#: A busy computer may pause for so long; that of a real bench is tried in the fault matrix.
+WATCHDOG_MS = 1500
 AGREED = Operation(confirmed=True)
 
 
@@ -38,7 +45,9 @@ def rig(tmp_path):
         text = text.replace(old, str(new))
     text = text.replace("/tmp/tcrctl-dynamixel-600", str(tmp_path / "motors"))
     path = tmp_path / "rig.yaml"
-    path.write_text(text.replace("timeout_ms: 60, watchdog_ms: 400", "timeout_ms: 400, watchdog_ms: 2500"))
+    path.write_text(
+        text.replace("timeout_ms: 60, watchdog_ms: 400", f"timeout_ms: 400, watchdog_ms: {WATCHDOG_MS}")
+    )
     return path
 
 
@@ -80,5 +89,43 @@ def test_faults_of_a_script_reach_the_motors_and_others_are_refused(bench, rig):
     assert winches.bus.silent
     winches.faults.clear()
     assert not winches.bus.silent
-    with pytest.raises(InputError, match="have no fault estop; they have silence, corrupt, drive"):
+    with pytest.raises(
+        InputError, match="have no fault estop; they have silence, corrupt, delay, drive, jam"
+    ):
         winches.faults.set("estop")
+    with pytest.raises(InputError, match="jam of emulated Dynamixel motors takes axis, not seconds"):
+        winches.faults.set("jam", seconds=1.0)
+    with pytest.raises(InputError, match="there is no motor 9; there are 1, 2, 3"):
+        winches.faults.set("jam", axis=9)
+
+
+def until(true, seconds=120.0):
+    """The time that it took until something was true [s]."""
+    begun = time.monotonic()
+    while not true():
+        assert time.monotonic() - begun < seconds
+        time.sleep(0.002)
+    return time.monotonic() - begun
+
+
+@on_a_punctual_computer
+def test_motors_of_a_killed_run_are_stopped_by_their_own_watchdog_in_its_time_and_stay(bench, rig, tmp_path):
+    bus, loaded = bench.plcs["tcr600"].bus, load_rig(str(rig), load_robot("tcr600"))
+    reset_rig(loaded, NAMES, AGREED, dry_run=False)  # should this be tried again
+    start = np.array(list(bus.turns().values()))
+    options = short_runs.arguments("plant.kind=rig", f"plant.rig={rig}")
+    run = short_runs.start(*options, "--yes", "--out", str(tmp_path / "runs"), cwd=tmp_path)
+    until(lambda: run.poll() is not None or np.abs(np.array(list(bus.turns().values())) - start).max() > 20.0)
+    assert run.poll() is None, run.communicate()
+    run.kill()
+    run.communicate()
+    armed_for = until(lambda: bus.watchdogs() == [table.TRIPPED] * 3)
+    assert armed_for <= 1e-3 * WATCHDOG_MS + 0.1
+    stopped = bus.turns()
+    assert [motor.get(table.TORQUE_ENABLE) for motor in bus.motors.values()] == [1] * 3
+    with pytest.raises(ArmingRefusedError, match="watchdog of the drives has tripped"):
+        jog(loaded, 2e-3)
+    assert bus.turns() == stopped
+    assert reset_rig(loaded, NAMES, AGREED, dry_run=False)["cleared"] is True
+    jogged = jog(loaded, 2e-3)
+    assert jogged["to_mm"]["c2"] == pytest.approx(jogged["from_mm"]["c2"] + 2.0, abs=0.1)

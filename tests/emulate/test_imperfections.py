@@ -7,9 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tcr_hardware.dynamixel import table
+from tcr_hardware.emulators.dynamixel_motor import DynamixelMotor
 from tcr_hardware.servo import ServoSettings
+from tcrctl.emulate.drives import emulated_drives
 from tcrctl.emulate.imperfections import Imperfections
 from tcrctl.emulate.robot import EmulatedRobot
+from tcrctl.emulate.settings import EmulationSettings
+from tcrctl.plant.rig.file import read_rig
 from tcrctl.plant.settings import Mismatch, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.signals import Command
@@ -80,3 +85,41 @@ def test_the_robot_moves_as_that_of_a_simulated_plant_with_ideal_drives(tcr5x4, 
     np.testing.assert_allclose(rings[3:], plant.read().nodes, rtol=0, atol=3e-5)
     assert np.abs(plant.truth().q - real.robot.rest.q).max() > 3e-3
     assert isinstance(ideal, SimulatedSettings)
+
+
+@pytest.mark.parametrize("level", ["off", "moderate"])
+def test_emulated_motors_have_the_drawn_drives_in_counts(tcr600, level):
+    section = read_rig("dynamixel_loopback")[0].robots["tcr600"]
+    real = Imperfections("tcr600", tcr600, MISMATCH, level, 3)
+    with emulated_drives(section, EmulationSettings(), real).bus as bus:
+        if level == "off":
+            assert [motor.servo.output for motor in bus.motors.values()] == [0.0] * 3
+        else:
+            count = 1e3 * section.plc.mm_per_turn / 4096
+            wanted = [1e3 * error / count for error in real.plant.drives.zero_error_mm]
+            assert [motor.servo.output for motor in bus.motors.values()] == pytest.approx(wanted)
+        assert {round(turn) for turn in bus.turns().values()} == {section.plc.zero_tick - 100}
+
+
+def test_a_motor_reports_its_horn_and_winds_what_lag_play_and_drum_leave():
+    servo = ServoSettings(
+        lag_s=0.1,
+        speed_um_s=np.inf,
+        acceleration_um_s2=np.inf,
+        backlash_um=20.0,
+        radius_error=0.1,
+        zero_error_um=5.0,
+    )
+    motor = DynamixelMotor(1000, 0.0, servo=servo)
+    motor.write(table.TORQUE_ENABLE.address, b"\1")
+    motor.write(table.GOAL_POSITION.address, (1200).to_bytes(4, "little"))
+    for t in np.arange(0.0, 0.2, 1e-3):
+        motor.advance(t)
+    behind = 1200 - motor.turn  # the profile has arrived after 0.064 s and is followed with the lag
+    assert behind == pytest.approx(
+        200 * (np.exp(0.064 / 0.1) - 1) * 0.1 / 0.064 * np.exp(-0.2 / 0.1), rel=0.05
+    )
+    for t in np.arange(0.2, 3.0, 1e-3):
+        motor.advance(t)
+    assert motor.get(table.PRESENT_POSITION) == 1200
+    assert motor.servo.output == pytest.approx(5.0 + 1.1 * (200.0 - 10.0), abs=0.01)

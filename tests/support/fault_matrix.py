@@ -237,6 +237,9 @@ class WatchedEmulators:
             lambda: rest + 5e-5 * random.standard_normal(rest.shape),
             self.motive_settings,
         )
+        self.watch_drives()
+
+    def watch_drives(self):
         limits = PlcLimitSettings(min_um=-25_000, max_um=25_000, watchdog_ms=self.watchdog_ms)
         self.plc = PlcEmulator(PlcSettings(limits=limits))
         write = self.plc.write
@@ -248,6 +251,15 @@ class WatchedEmulators:
             write(address, words)
 
         self.plc.write = noted
+
+    def section(self):
+        """Where the drives are, for the rig file."""
+        return {
+            "kind": "modbus_tcp",
+            "host": self.plc.address[0],
+            "port": self.plc.address[1],
+            "timeout_ms": self.timeout_ms,
+        }
 
     def __enter__(self):
         self.plc.start()
@@ -271,12 +283,7 @@ class WatchedEmulators:
                     },
                     "robots": {
                         "tcr5x4": {
-                            "plc": {
-                                "kind": "modbus_tcp",
-                                "host": self.plc.address[0],
-                                "port": self.plc.address[1],
-                                "timeout_ms": self.timeout_ms,
-                            },
+                            "plc": self.section(),
                             "cables": cables,
                             "markers": {"labels": "m{ring}.n{node}"},
                         }
@@ -339,9 +346,16 @@ class Loop:
             self.k += 1
 
 
-def play(case: Case, phase: str, robot: Any, rules: dict[str, Any], watchdog_ms: int = 200) -> Outcome:
+def play(
+    case: Case,
+    phase: str,
+    robot: Any,
+    rules: dict[str, Any],
+    watchdog_ms: int = 200,
+    bench: Any = WatchedEmulators,
+) -> Outcome:
     """Let a fault happen in a phase."""
-    with WatchedEmulators(robot, rules, watchdog_ms) as emulators:
+    with bench(robot, rules, watchdog_ms) as emulators:
         if phase == "connect":
             emulators.fail(case)
         plant, error, begun = None, None, time.monotonic()
@@ -370,7 +384,7 @@ def play(case: Case, phase: str, robot: Any, rules: dict[str, Any], watchdog_ms:
             error,
             decided - begun,
             [text for kind, _, text in emulators.events if kind == "supervisor"],
-            np.array(emulators.sent).reshape(-1, 6),
+            np.array(emulators.sent).reshape(-1, 6 if bench is WatchedEmulators else 4),
             moved,
         )
 

@@ -138,6 +138,11 @@ def test_runs_without_a_result_are_no_proof_that_settings_are_better(lost, tmp_p
     made = json.loads(capsys.readouterr().out)
     assert (made["status"], made["better"], made["files"]) == ("failed", False, [])
     assert made["reason"] == "1 of 3 runs without a result: 1 crashed"
+    monkeypatch.setenv("COLUMNS", "60")
+    main([*order, "--out", str(tmp_path)])
+    told = capsys.readouterr()
+    assert max(len(line) for line in told.out.splitlines() if len(line.split()) > 1) <= 60
+    assert "worst decile" in told.out
 
 
 def test_a_plant_is_never_its_own_judge(tmp_path, capsys):

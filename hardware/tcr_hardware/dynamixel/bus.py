@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import termios
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
@@ -9,7 +10,7 @@ from typing import Any, Final
 import dynamixel_sdk
 import serial
 
-from tcr_hardware.dynamixel.table import FIRST_VOLATILE, MODEL, PRESENT_POSITION, Register
+from tcr_hardware.dynamixel.table import FIRST_VOLATILE, MODEL, MOTION, PRESENT_POSITION, Register
 from tcr_hardware.errors import HardwareError
 
 _sdk: Any = dynamixel_sdk  # it has no types
@@ -34,6 +35,12 @@ class _Port(_sdk.PortHandler):
 
     def setPacketTimeout(self, length: int) -> None:  # noqa: N802
         self.setPacketTimeoutMillis(self.tx_time_per_byte * length + self._timeout_ms)
+
+    def clearPort(self) -> None:  # noqa: N802
+        try:
+            super().clearPort()
+        except termios.error as error:  # no OSError, but one: the line has been pulled out
+            raise serial.SerialException(str(error)) from error
 
     def readPort(self, length: int) -> bytes:  # noqa: N802
         if not self.ser.in_waiting:
@@ -67,7 +74,7 @@ class DynamixelBus:
     def seconds(self) -> float:
         """Return how long the bytes of one exchange take on the wire [s]."""
         answers = len(self.ids) * (OVERHEAD + self._block.size)
-        questions = 2 * OVERHEAD + len(self.ids) * (2 + 4)
+        questions = 2 * OVERHEAD + len(self.ids) * (2 + MOTION.size)
         return BYTE_BITS * (answers + questions) / self._baud
 
     def read(self, motor: int, register: Register) -> int:
@@ -112,8 +119,9 @@ class DynamixelBus:
             HardwareError: The line is gone.
         """
         group = _sdk.GroupSyncWrite(self._port, self._packets, register.address, register.size)
+        all_bits = (1 << 8 * register.size) - 1
         for motor, value in values.items():
-            group.addParam(motor, list((value & 0xFFFFFFFF).to_bytes(4, "little")[: register.size]))
+            group.addParam(motor, list((value & all_bits).to_bytes(register.size, "little")))
         self._answered("the bus", lambda: (0, group.txPacket(), 0))
 
     def read_all(self) -> dict[int, bytes]:
@@ -140,11 +148,12 @@ class DynamixelBus:
         for _ in range(1 + RETRIES):
             try:
                 found = call()
+                if found[1] != _sdk.COMM_SUCCESS:
+                    self._port.clearPort()
             except (OSError, serial.SerialException) as error:
                 raise HardwareError(f"the line is gone: {error}") from error
             if found[1] == _sdk.COMM_SUCCESS:
                 return found
-            self._port.clearPort()
             self._port.is_using = False
         raise HardwareError(f"{who} does not answer: {self._packets.getTxRxResult(found[1])}")
 

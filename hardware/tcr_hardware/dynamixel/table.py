@@ -39,6 +39,8 @@ BUS_WATCHDOG: Final = Register(98, 1)
 GOAL_CURRENT: Final = Register(102, 2)
 PROFILE_VELOCITY: Final = Register(112, 4)
 GOAL_POSITION: Final = Register(116, 4)
+#: Profile velocity and goal position, which follows it, as one number.
+MOTION: Final = Register(PROFILE_VELOCITY.address, PROFILE_VELOCITY.size + GOAL_POSITION.size)
 PRESENT_POSITION: Final = Register(132, 4)
 #: From here on nothing is used.
 END: Final = 147

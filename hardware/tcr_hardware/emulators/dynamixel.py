@@ -10,12 +10,14 @@ import os
 import select
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from typing import Final
 
 from tcr_hardware.dynamixel.table import BUS_WATCHDOG, HARDWARE_ERROR, HardwareFault, Mode
-from tcr_hardware.emulators.dynamixel_motor import DynamixelMotor
+from tcr_hardware.emulators.dynamixel_motor import IDEAL, DynamixelMotor
 from tcr_hardware.emulators.modbus_rtu import pseudo_terminal
+from tcr_hardware.servo import ServoSettings
 
 HEADER: Final = b"\xff\xff\xfd\x00"
 PING, READ, WRITE, SYNC_READ, SYNC_WRITE, STATUS = 0x01, 0x02, 0x03, 0x82, 0x83, 0x55
@@ -33,6 +35,9 @@ class DynamixelEmulator:
         device: Name of the serial device.
         silent: Nobody answers, and nothing that is sent arrives.
         corrupt: So many of the next answers have a flipped bit.
+        lost: So many of the next answers are not sent.
+        delay: Answers come so late [s].
+        deaf: Motors behind a broken wire: they neither hear nor answer.
     """
 
     def __init__(
@@ -40,6 +45,7 @@ class DynamixelEmulator:
         turns: Mapping[int, int],
         *,
         mode: int = Mode.POSITION,
+        servos: Mapping[int, ServoSettings] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Open a pseudo-terminal.
@@ -47,16 +53,22 @@ class DynamixelEmulator:
         Args:
             turns: Where the horn of every motor stands [counts].
             mode: Their operating mode.
+            servos: Their position loops, in counts; ideal ones where there is none.
             clock: Never jumps [s].
 
         Raises:
             HardwareError: There are no pseudo-terminals on this system.
         """
         self._clock, self._lock, self._end = clock, threading.RLock(), threading.Event()
-        self.motors = {number: DynamixelMotor(turn, clock(), mode) for number, turn in turns.items()}
+        loops = dict.fromkeys(turns, IDEAL) | dict(servos or {})
+        self.motors = {
+            number: DynamixelMotor(turn, clock(), mode, loops[number]) for number, turn in turns.items()
+        }
         self._ours, self._theirs = pseudo_terminal()
         self.device, self.silent, self.corrupt = os.ttyname(self._theirs), False, 0
-        self._waiting = b""
+        self.lost, self.delay, self.deaf = 0, 0.0, set[int]()
+        self._plugged = True
+        self._waiting, self._outbox = b"", deque[tuple[float, bytes]]()
         self._thread = threading.Thread(target=self._serve, daemon=True)
 
     def __enter__(self) -> DynamixelEmulator:
@@ -68,7 +80,8 @@ class DynamixelEmulator:
         """End it."""
         self._end.set()
         self._thread.join()
-        os.close(self._ours)
+        if self._plugged:
+            os.close(self._ours)
         os.close(self._theirs)
 
     def turns(self) -> dict[int, float]:
@@ -76,6 +89,12 @@ class DynamixelEmulator:
         with self._lock:
             self._advance()
             return {number: motor.turn for number, motor in self.motors.items()}
+
+    def wound(self) -> dict[int, float]:
+        """Return how far the drums have turned since the start by motor [counts]."""
+        with self._lock:
+            self._advance()
+            return {number: motor.servo.output for number, motor in self.motors.items()}
 
     def watchdogs(self) -> list[int]:
         """Return what the bus watchdogs read."""
@@ -88,15 +107,40 @@ class DynamixelEmulator:
         with self._lock:
             self.motors[number].fail(fault)
 
+    def stall(self, number: int, *, stalled: bool = True) -> None:
+        """Let a motor be held against its current limit, or let it go."""
+        with self._lock:
+            self.motors[number].servo.jammed = stalled
+
+    def restart(self) -> None:
+        """Let all motors lose power for a moment."""
+        with self._lock:
+            for motor in self.motors.values():
+                motor.restart()
+
+    def unplug(self) -> None:
+        """Let the line be pulled out of the computer: the device is gone for good."""
+        with self._lock:
+            if self._plugged:
+                os.close(self._ours)
+            self._plugged = False
+
     def _serve(self) -> None:
-        while not self._end.is_set():
-            ready, _, _ = select.select([self._ours], [], [], TICK)
-            data = os.read(self._ours, 4096) if ready else b""
+        while not self._end.wait(0.0 if self._plugged else TICK):
+            if self._plugged:
+                select.select([self._ours], [], [], TICK)
             with self._lock:
                 self._advance()
+                data = self._read()
                 self._waiting = b"" if self.silent else self._waiting + data
                 for number, instruction, parameters in self._packets():
                     self._obey(number, instruction, parameters)
+                self._send()
+
+    def _read(self) -> bytes:
+        if not self._plugged or not select.select([self._ours], [], [], 0.0)[0]:
+            return b""
+        return os.read(self._ours, 4096)
 
     def _advance(self) -> None:
         now = self._clock()
@@ -119,13 +163,17 @@ class DynamixelEmulator:
                 yield packet[4], packet[7], body
 
     def _obey(self, number: int, instruction: int, given: bytes) -> None:
-        for motor in self.motors.values():
-            motor.feed()
+        for motor in self._hearing():
+            self.motors[motor].feed()
         if instruction in (SYNC_READ, SYNC_WRITE):
             self._obey_all(instruction, given)
-        elif number in self.motors or number == EVERYBODY:
-            for each in self.motors if number == EVERYBODY else (number,):
-                self._obey_one(each, instruction, given)
+        else:
+            for each in self._hearing():
+                if number in (each, EVERYBODY):
+                    self._obey_one(each, instruction, given)
+
+    def _hearing(self) -> list[int]:
+        return [number for number in self.motors if number not in self.deaf]
 
     def _obey_one(self, number: int, instruction: int, given: bytes) -> None:
         motor, address = self.motors[number], int.from_bytes(given[:2], "little")
@@ -143,11 +191,11 @@ class DynamixelEmulator:
             given[4:],
         )
         if instruction == SYNC_READ:
-            for number in (n for n in rest if n in self.motors):
+            for number in (n for n in rest if n in self._hearing()):
                 self._answer(number, 0, self.motors[number].read(address, count))
             return
         for at in range(0, len(rest), 1 + count):
-            if rest[at] in self.motors:
+            if rest[at] in self._hearing():
                 self.motors[rest[at]].write(address, rest[at + 1 : at + 1 + count])
 
     def _answer(self, number: int, error: int, data: bytes) -> None:
@@ -158,7 +206,15 @@ class DynamixelEmulator:
         if self.corrupt:
             self.corrupt -= 1
             packet = packet[:-3] + bytes((packet[-3] ^ 0x10,)) + packet[-2:]
-        os.write(self._ours, packet)
+        if self.lost:
+            self.lost -= 1
+        else:
+            self._outbox.append((self._clock() + self.delay, packet))
+
+    def _send(self) -> None:
+        """Send the answers that are due."""
+        while self._plugged and self._outbox and self._outbox[0][0] <= self._clock():
+            os.write(self._ours, self._outbox.popleft()[1])
 
 
 def crc(data: bytes) -> int:

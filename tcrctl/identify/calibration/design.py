@@ -9,6 +9,7 @@ there is one. Source: [FED72].
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -50,13 +51,19 @@ class Design:
     left: Array
 
 
-def sensitivities(body: Body, drives: Array, spec: SelfCalibrationSpec) -> Array:
+def sensitivities(
+    body: Body,
+    drives: Array,
+    spec: SelfCalibrationSpec,
+    progress: Callable[[int, int | None], None] = lambda done, total: None,
+) -> Array:
     """Return what every pose tells, as rows of a square root of its information (k, MOST, n_unknowns).
 
     Args:
         body: The robot as described.
         drives: Drive lengths of all candidates (k, m) [m].
         spec: What is assumed.
+        progress: Takes how many candidates were looked at, and how many there are.
 
     Raises:
         NoEquilibriumError: If the robot has no stable shape in one of them.
@@ -72,6 +79,7 @@ def sensitivities(body: Body, drives: Array, spec: SelfCalibrationSpec) -> Array
         _, size, ways = np.linalg.svd(white, full_matrices=False)
         kept = min(MOST, int(np.sum(size > LITTLE * size[0])))
         told[k, :kept] = size[:kept, None] * ways[:kept]
+        progress(k + 1, len(drives))
     return told
 
 

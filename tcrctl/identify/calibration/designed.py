@@ -58,7 +58,11 @@ class Designed:
 
 
 def design_excitation(
-    name: str, spec: SelfCalibrationSpec, out: Path, notify: Callable[[str], None]
+    name: str,
+    spec: SelfCalibrationSpec,
+    out: Path,
+    notify: Callable[[str], None],
+    progress: Callable[[int, int | None], None] = lambda done, total: None,
 ) -> Designed:
     """Choose the poses of an excitation, as many as it draws, and write it into a new folder.
 
@@ -67,6 +71,7 @@ def design_excitation(
         spec: What is assumed.
         out: Where the folder is made.
         notify: Takes messages for the user.
+        progress: Takes how many candidates were looked at, and how many there are.
 
     Raises:
         InputError: If it is no excitation, or no taut poses can be drawn.
@@ -80,7 +85,7 @@ def design_excitation(
     candidates = draw_poses(section.draw, robot, CANDIDATES * count, np.random.default_rng(section.seed))
     notify(f"{len(candidates)} candidates for {count} poses")
     body = Body(loaded.robot, robot, make_unknowns(loaded.robot, spec))
-    design = choose(sensitivities(body, 1e-3 * candidates, spec), count)
+    design = choose(sensitivities(body, 1e-3 * candidates, spec, progress), count)
     poses = np.round(candidates[design.chosen], DIGITS)
     folder = make_run_folder(out, f"{loaded.spec.name}_design")
     folder.write(f"{loaded.spec.name}.yaml", _text(loaded.given_text, poses.tolist()))

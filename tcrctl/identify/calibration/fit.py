@@ -8,6 +8,7 @@ fit much worse than the others (Student's distribution). The posterior covarianc
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -60,11 +61,12 @@ class Calibrator:
         self._sight = Sight(body.unknowns, body.robot.n_modules)
         self._shapes = Shapes(body, rests, spec.rest)
 
-    def fit(self, start: Array | None = None) -> Fit:
+    def fit(self, start: Array | None = None, told: Callable[[int], None] = lambda steps: None) -> Fit:
         """Find the unknowns.
 
         Args:
             start: Where to begin (n,); zeros if None.
+            told: Takes the number of steps so far.
 
         Raises:
             NoEquilibriumError: If the robot has no stable shape on the way.
@@ -78,6 +80,7 @@ class Calibrator:
             J = np.vstack([np.sqrt(w) * slopes for w, (slopes, _, _) in zip(weight, rows, strict=True)])
             r = np.concatenate([np.sqrt(w) * res for w, (_, res, _) in zip(weight, rows, strict=True)])
             information = J.T @ J + np.eye(prior.size)
+            told(k)
             if step < SMALL or k == self._spec.iterations:
                 break
             move = np.linalg.solve(information, J.T @ r - x / prior)

@@ -26,6 +26,7 @@ from tcrctl.log.run_files import RunFiles
 from tcrctl.robot.robot import build_robot
 
 Notify = Callable[[str], None]
+Progress = Callable[[int, int | None], None]
 #: Fewest rests from which anything can be found.
 FEWEST: Final = 6
 #: Without an excitation, one in so many rests is kept.
@@ -49,13 +50,19 @@ class Calibrated:
     result: CalibrationResult
 
 
-def calibrate(path: Path, spec: SelfCalibrationSpec, notify: Notify = lambda text: None) -> Calibrated:
+def calibrate(
+    path: Path,
+    spec: SelfCalibrationSpec,
+    notify: Notify = lambda text: None,
+    progress: Progress = lambda done, most: None,
+) -> Calibrated:
     """Find robot, cameras and drives of the log of an excitation.
 
     Args:
         path: The log.
         spec: What is assumed.
         notify: Takes messages for the user.
+        progress: Takes how many steps are done, and how many there are at most.
 
     Raises:
         InputError: If it is no log with a robot, or has too few rests.
@@ -77,11 +84,13 @@ def calibrate(path: Path, spec: SelfCalibrationSpec, notify: Notify = lambda tex
     others = np.setdiff1d(np.arange(len(rests.t)), kept)
     notify(f"{len(rests.t)} rests, {len(kept)} of them held out; {len(body.unknowns)} unknowns")
     end, zero = end_markers(description.tip.ring), np.zeros(len(body.unknowns))
-    first = Calibrator(body, rests.only(others), spec).fit()
+    most = spec.iterations
+    first = Calibrator(body, rests.only(others), spec).fit(told=lambda k: progress(k, 2 * most))
     notify(f"without those held out: {first.iterations} steps, misfit {first.misfit:.2f}")
     whole = Calibrator(body, rests, spec)
     before, without = whole.residual(zero), Calibrator(body, rests.only(kept), spec).residual(first.x)
-    fit = whole.fit(first.x)
+    done = first.iterations
+    fit = whole.fit(first.x, told=lambda k: progress(done + k, done + most))
     notify(f"with all: {fit.iterations} steps, misfit {fit.misfit:.2f}")
     rubbing = find_friction(log, every, body, fit.x, spec.rest) if spec.friction else NOTHING
     result = CalibrationResult(

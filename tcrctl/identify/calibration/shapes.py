@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,14 +43,15 @@ class Shapes:
         self._body, self._rests, self._settings = body, rests, settings
         self._last = [body.robot.rest.q] * len(rests.drive)
 
-    def at(self, x: Array) -> list[Shape]:
-        """Return the shapes of all rests for unknowns x (n,).
+    def at(self, x: Array) -> Iterator[Shape]:
+        """Yield the shapes of all rests for unknowns x (n,).
 
         Raises:
             NoEquilibriumError: If the robot that x describes has no stable shape at a rest.
         """
         side, twins = self._body.side(x), self._body.twins(x)
-        return [self._shape(k, x, side, twins) for k in range(len(self._last))]
+        for k in range(len(self._last)):
+            yield self._shape(k, x, side, twins)
 
     def _shape(self, k: int, x: Array, side: Side, twins: tuple[Twins, ...]) -> Shape:
         u, rests = self._body.unknowns, self._rests

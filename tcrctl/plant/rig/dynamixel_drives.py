@@ -29,6 +29,8 @@ STILL: Final = 2
 MARGIN: Final = 0.1
 #: Every packet feeds the bus watchdog, so after an exchange motors are only read for this share of its time.
 READABLE: Final = 0.4
+#: A set-point is reached by this factor sooner than the next one is due, which may come a little early.
+SOONER: Final = 1.1
 
 
 class DynamixelDrives:
@@ -45,6 +47,9 @@ class DynamixelDrives:
         self._ids = [cable.axis for cable in cables]
         self._signs = np.array([cable.sign for cable in cables])
         self._count = 1e3 * settings.mm_per_turn / table.TURN  # [um]
+        self._velocity_unit = 1e3 * settings.mm_per_turn * table.VELOCITY_UNIT  # [um/s]
+        self._fastest = [max(1, int(cable.speed / self._velocity_unit)) for cable in cables]
+        self._period: float | None = None  # of who sends set-points [s], once it is known
         self._bus: DynamixelBus = self._call(
             lambda: DynamixelBus(settings.device, settings.baud, self._ids, settings.timeout_ms / 1e3)
         )
@@ -65,6 +70,7 @@ class DynamixelDrives:
             "Dynamixel bus", self._where, f"models {models}, watchdog {told['watchdog']}", told
         )
         self._last, self._exchanged = self._read(), -math.inf
+        self._sent = self._last.position
         self._reset_seen = self._zero_seen = self._stopping = False
         self._reject = ""
 
@@ -81,6 +87,7 @@ class DynamixelDrives:
         if 3.0 * period > self._fed_for:
             least = math.ceil(3e3 * (1.0 + READABLE) * period)
             raise InputError(f"{self._where}: watchdog_ms must be at least {least} for {1e3 * period:g} ms")
+        self._period = period
         return share
 
     def status(self) -> DriveStatus:
@@ -140,9 +147,7 @@ class DynamixelDrives:
         self._all(table.BUS_WATCHDOG, dict.fromkeys(self._ids, self._ticks))
 
     def _profile(self) -> None:
-        per_unit = self._settings.mm_per_turn * 1e3 * table.VELOCITY_UNIT  # [um/s]
-        speeds = {cable.axis: max(1, int(cable.speed / per_unit)) for cable in self._cables}
-        self._all(table.PROFILE_VELOCITY, speeds)
+        self._all(table.PROFILE_VELOCITY, dict(zip(self._ids, self._fastest, strict=True)))
         if self._settings.current_limit_ma is not None:
             units = int(self._settings.current_limit_ma / self._settings.current_unit_ma)
             self._all(table.GOAL_CURRENT, dict.fromkeys(self._ids, units))
@@ -150,7 +155,9 @@ class DynamixelDrives:
     def _hold(self) -> None:
         """Make the present positions the goals."""
         data = self._call(self._bus.read_all)
-        self._all(table.GOAL_POSITION, {m: signed(data[m], table.PRESENT_POSITION) for m in self._ids})
+        counts = {motor: signed(data[motor], table.PRESENT_POSITION) for motor in self._ids}
+        self._all(table.GOAL_POSITION, counts)
+        self._sent = self._lengths(np.array(list(counts.values())))
 
     def _stop(self) -> None:
         if not self._stopping:
@@ -170,7 +177,19 @@ class DynamixelDrives:
             f"out of range, cable {self._cables[int(np.argmax(outside))].name}" if outside.any() else ""
         )
         if not outside.any():
-            self._all(table.GOAL_POSITION, dict(zip(self._ids, self._counts(target), strict=True)))
+            motions = zip(self._ids, self._velocities(target), self._counts(target), strict=True)
+            whole = (1 << 8 * table.GOAL_POSITION.size) - 1
+            below = 8 * table.PROFILE_VELOCITY.size
+            self._all(table.MOTION, {m: velocity | (goal & whole) << below for m, velocity, goal in motions})
+            self._sent = target
+
+    def _velocities(self, target: NDArray[np.int64]) -> list[int]:
+        """Return profile velocities that reach set-points in a period: motors that dash and wait shake robots."""
+        if self._period is None:
+            return self._fastest
+        speeds = SOONER * np.abs(target - self._sent) / self._period  # [um/s]
+        units = np.ceil(speeds / self._velocity_unit).astype(int)
+        return [int(value) for value in np.clip(units, 1, self._fastest)]
 
     def _zero(self) -> None:
         """Move the homing offsets so that the present positions read ``zero_tick``; the torque is off meanwhile."""
@@ -230,8 +249,7 @@ class DynamixelDrives:
             [self._lengths(np.array([end[motor] for motor in self._ids])) for end in ends], float
         )
         slowest = min(self._each(table.VELOCITY_LIMIT).values())
-        speed = slowest * table.VELOCITY_UNIT * 1e3 * self._settings.mm_per_turn
-        return DeviceLimits(lengths.min(axis=0), lengths.max(axis=0), speed)
+        return DeviceLimits(lengths.min(axis=0), lengths.max(axis=0), slowest * self._velocity_unit)
 
     # --- the line ---
 

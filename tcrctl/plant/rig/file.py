@@ -117,7 +117,7 @@ def period_misfits(loaded: LoadedRig, period: float) -> Iterator[str]:
     if WATCHDOG_PERIODS * period_ms > watchdog:
         longest = 1e-3 * watchdog / WATCHDOG_PERIODS
         yield (
-            f"is {period:g} s; the watchdog of the PLC has to be at least {WATCHDOG_PERIODS} periods, and "
+            f"is {period:g} s; the watchdog of the drives has to be at least {WATCHDOG_PERIODS} periods, and "
             f"plc.watchdog_ms of {loaded.path} is {watchdog:g} ms: at most {longest:.3g} s"
         )
 

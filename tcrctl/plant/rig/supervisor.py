@@ -185,9 +185,7 @@ class Supervisor:
             self._go(SafetyState.DISARMED, "info", f"standstill after {waited:.2f} s")
         elif waited > self._rules.standstill:
             why = health.trouble if status is None else "the drives are still moving"
-            text = (
-                f"no standstill within {waited:.2f} s ({why}); the watchdog of the PLC has to stop the drives"
-            )
+            text = f"no standstill within {waited:.2f} s ({why}); the watchdog of the drives has to stop them"
             self._end(now, SafetyState.FAULTED, DeviceError(text, hint=RESET_HINT))
         return self.state
 
@@ -215,7 +213,9 @@ class Supervisor:
                 f"limit {rules.following / 1e3:.2f} mm"
             )
         if health.refused >= rules.rejects and status is not None:
-            return RigStopError(f"the PLC refused {health.refused} set-points in a row: {_refusal(status)}")
+            return RigStopError(
+                f"the drives refused {health.refused} set-points in a row: {_refusal(status)}"
+            )
         return None
 
     def _end(self, now: float, state: SafetyState, failure: TcrctlError) -> None:
@@ -237,11 +237,11 @@ def _fault(status: DriveStatus | None, *, enabled: bool = True) -> str:
     if status.estop:
         return "the emergency stop is pressed"
     if status.watchdog:
-        return "the watchdog of the PLC has tripped: it was not written to in time"
+        return "the watchdog of the drives has tripped: they were not written to in time"
     if status.fault:
-        return f"the PLC reports a fault: {status.fault}"
+        return f"the drives report a fault: {status.fault}"
     if enabled and not status.enabled:
-        return "the PLC has switched the drives off"
+        return "the drives have switched themselves off"
     return ""
 
 
@@ -252,7 +252,7 @@ def _doubt(health: Health, rules: Rules) -> str:
     if health.age >= rules.stale:
         return f"no usable measurement for {1e3 * health.age:.0f} ms{_doubts(health)}"
     if health.refused and health.status is not None:
-        return f"the PLC refused a set-point: {_refusal(health.status)}"
+        return f"the drives refused a set-point: {_refusal(health.status)}"
     return ""
 
 
@@ -274,9 +274,9 @@ def _refusals(health: Health, rules: Rules) -> list[str]:
     if not status.zeroed:
         reasons.append("tension-zero is not known (tcrctl rig zero)")
     if not status.remote:
-        reasons.append("the PLC is not switched to remote")
+        reasons.append("the drives are not switched to remote")
     if not status.acknowledged:
-        reasons.append("the PLC does not acknowledge")
+        reasons.append("the drives do not acknowledge")
     if health.age == math.inf:
         reasons.append(f"the cameras have shown no usable measurement{_doubts(health)}")
     elif not health.age < rules.stale:

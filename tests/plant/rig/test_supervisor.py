@@ -92,7 +92,7 @@ FAULTS = {
     "e-stop": (status(estop=True), SafetyState.FAULTED, RigStopError, "emergency stop"),
     "watchdog": (status(watchdog=True), SafetyState.FAULTED, RigStopError, "watchdog"),
     "PLC fault": (status(fault="drive"), SafetyState.FAULTED, RigStopError, "drive"),
-    "drives off": (status(enabled=False), SafetyState.FAULTED, RigStopError, "switched the drives off"),
+    "drives off": (status(enabled=False), SafetyState.FAULTED, RigStopError, "switched themselves off"),
     "stale for long": (replace(GOOD, age=0.2), SafetyState.STOPPING, RigStopError, "200 ms"),
     "silent": (replace(GOOD, trouble="timeout", silence=0.11), SafetyState.STOPPING, DeviceError, "110 ms"),
     "nonsense": (
