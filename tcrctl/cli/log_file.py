@@ -7,11 +7,11 @@ from typing import Annotated, TypeAlias
 
 import typer
 
-from tcrctl.experiment.run_folder import log_in
-
 
 def log_path(text: str) -> Path:
     """Read an argument that names a log, or the folder of its run."""
+    from tcrctl.experiment.run_folder import log_in  # not for those who only ask for help
+
     return log_in(Path(text))
 
 

@@ -27,7 +27,6 @@ from tcrctl.loop.safety import SafetyGuard, SafetyLimits
 from tcrctl.plant.own import OwnPlant
 from tcrctl.plant.plant import Plant, RunnablePlant
 from tcrctl.plant.realistic import rehearsal_plant
-from tcrctl.plant.rig.assembly import build_rig
 from tcrctl.plant.rig.operation import Operation, unheard
 from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
@@ -101,6 +100,8 @@ def _simulated(
 
 def _rig(settings: RigSettings, experiment: Experiment, operation: Operation) -> tuple[RunnablePlant, None]:
     del settings  # the file that it names is loaded
+    from tcrctl.plant.rig.assembly import build_rig  # heavy
+
     if experiment.loaded.rig is None:
         raise InputError("the experiment was loaded without a rig file")
     return build_rig(experiment.loaded.rig, experiment.robot, experiment.period, operation), None

@@ -10,13 +10,14 @@ topic              entities                                                     
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from tcrctl.log.geometry import CableHoles, LogGeometry
+from tcrctl.log.geometry import LogGeometry
 from tcrctl.log.scene_primitives import (
     BLUE,
     DARK,
@@ -30,6 +31,7 @@ from tcrctl.log.scene_primitives import (
     add_line,
     add_sphere,
     locked,
+    on_grid,
 )
 from tcrctl.log.task_scene import add_task
 from tcrctl.robot.module import rings
@@ -56,6 +58,7 @@ class Scene:
         self._geometry = geometry
         self._rods = geometry.rods.ravel().tolist()
         self._springs = geometry.springs.ravel()
+        self._moving: dict[int, _Moving] = {}
 
     def encode(self, nodes: Array, tension: Array, when: Timestamp) -> bytes:
         """Serialise the SceneUpdate of what moves.
@@ -65,16 +68,38 @@ class Scene:
             tension: Cable tensions (m,) [N].
             when: Time of the step.
         """
+        moving = self._moving.get(tension.size)
+        if moving is None:
+            moving = self._moving[tension.size] = self._drawn(nodes, tension)
+        points = [nodes, nodes[self._springs], *(cable.points(nodes) for cable in self._geometry.cables)]
+        moving.move(np.concatenate(points[: len(moving.cables) + 2]), when)
+        for colour, newton in zip(moving.cables, tension.tolist(), strict=False):
+            colour.r, _, colour.b = self._colour(newton)
+        return moving.update.SerializeToString()
+
+    def _drawn(self, nodes: Array, tension: Array) -> _Moving:
         update = SceneUpdate()
-        robot = update.entities.add(id="rods", frame_id=WORLD, timestamp=when)
+        robot = update.entities.add(id="rods", frame_id=WORLD)
         add_line(robot, PAIRS, nodes, _ROD_THICKNESS_M, DARK)
         robot.lines[0].indices.extend(self._rods)
         if self._springs.size:
-            springs = update.entities.add(id="springs", frame_id=WORLD, timestamp=when)
+            springs = update.entities.add(id="springs", frame_id=WORLD)
             add_line(springs, PAIRS, nodes[self._springs], _SPRING_THICKNESS_M, GREEN)
+        fixed = len(update.entities)
         for cable, newton in zip(self._geometry.cables, tension.tolist(), strict=False):
-            self._draw_cable(update, cable, newton, nodes, when)
-        return update.SerializeToString()
+            entity = update.entities.add(id=f"cable {cable.name}", frame_id=WORLD)
+            add_line(entity, STRIP, cable.points(nodes), _CABLE_THICKNESS_M, self._colour(newton))
+        lines = [entity.lines[0] for entity in update.entities]
+        return _Moving(
+            update,
+            list(update.entities),
+            [point for line in lines for point in line.points],
+            [line.color for line in lines[fixed:]],
+        )
+
+    def _colour(self, tension: float) -> tuple[float, float, float]:
+        share = min(1.0, max(0.0, tension / self._geometry.full_scale_tension))
+        return round(share, 3), 0.1, round(1.0 - share, 3)
 
     def encode_static(self, nodes: Array, with_axis: bool, when: Timestamp) -> bytes:
         """Serialise the SceneUpdate of what never changes in its frame.
@@ -110,13 +135,28 @@ class Scene:
         )
         return update.SerializeToString()
 
-    def _draw_cable(
-        self, update: SceneUpdate, cable: CableHoles, tension: float, nodes: Array, when: Timestamp
-    ) -> None:
-        share = min(1.0, max(0.0, tension / self._geometry.full_scale_tension))
-        colour = (round(share, 3), 0.1, round(1.0 - share, 3))
-        entity = update.entities.add(id=f"cable {cable.name}", frame_id=WORLD, timestamp=when)
-        add_line(entity, STRIP, cable.points(nodes), _CABLE_THICKNESS_M, colour)
+
+class _Moving(NamedTuple):
+    """A scene that is kept: to move its points costs a quarter of making it.
+
+    Attributes:
+        update: The message.
+        entities: Its entities.
+        points: The points of all lines, in their order.
+        cables: Colours of the cables.
+    """
+
+    update: SceneUpdate
+    entities: Sequence[Any]
+    points: Sequence[Any]
+    cables: Sequence[Any]
+
+    def move(self, points: Array, when: Timestamp) -> None:
+        """Set all points (n, 3) [m] and the time."""
+        for entity in self.entities:
+            entity.timestamp.CopyFrom(when)
+        for point, (x, y, z) in zip(self.points, on_grid(points), strict=True):
+            point.x, point.y, point.z = x, y, z
 
 
 def _circle(radius: float) -> Array:

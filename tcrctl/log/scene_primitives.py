@@ -70,9 +70,14 @@ def add_line(entity: SceneEntity, kind: Any, points: Array, thickness: float, co
     line = entity.lines.add(type=kind, thickness=thickness)
     line.pose.orientation.w = 1.0
     _paint(line, colour)
-    rows: Sequence[Sequence[float]] = (np.round(points * _GRID) / _GRID).tolist()
-    for x, y, z in rows:
+    for x, y, z in on_grid(points):
         line.points.add(x=x, y=y, z=z)
+
+
+def on_grid(points: Array) -> Sequence[Sequence[float]]:
+    """Return points (n, 3) [m] as rows, on the grid of all drawings."""
+    rows: Sequence[Sequence[float]] = (np.round(points * _GRID) / _GRID).tolist()
+    return rows
 
 
 def _paint(primitive: Any, colour: Colour) -> None:

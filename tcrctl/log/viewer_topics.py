@@ -8,7 +8,7 @@ robot), nothing is drawn.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -18,8 +18,9 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from tcrctl.log.geometry import LogGeometry
+from tcrctl.log.kept_messages import kept_backbone, kept_frames, kept_pose
 from tcrctl.log.ring_frames import drawable, quaternion_of_normal, ring_frames
-from tcrctl.log.scene import REFERENCE, WORLD, Scene
+from tcrctl.log.scene import REFERENCE, Scene
 from tcrctl.robot.module import ring_nodes, rings
 from tcrctl.signals import Array, Measurement, Reference, StepRecord
 
@@ -57,10 +58,6 @@ def rounded(values: Array, grid: float) -> list[list[float]]:
     return rows
 
 
-Pose = tuple[Array, Array]
-"""Position (3,) [m] and quaternion x, y, z, w (4,)."""
-
-
 class ViewerTopics:
     """Makes the messages of the derived topics of one log.
 
@@ -74,6 +71,9 @@ class ViewerTopics:
         self._scene_stride = stride(period, SCENE_RATE_HZ)
         self._scene = Scene(geometry)
         self._static_written = False
+        self._frames = kept_frames(geometry.ring_names)
+        self._frames_and_wanted = kept_frames((*geometry.ring_names, REFERENCE))
+        self._backbone, self._tip = kept_backbone(len(geometry.ring_names)), kept_pose()
         marker_of = {node: row for row, node in enumerate(geometry.marker_nodes)}
         tip = ring_nodes(geometry.tip_ring)
         self._tip_markers = (
@@ -100,45 +100,54 @@ class ViewerTopics:
 
     def _nodes(self, record: StepRecord) -> Array | None:
         """Return the node positions (n_nodes, 3) [m] if the step has a shape that can be drawn."""
-        shape = _shape(record)
+        shape = _drawn(record)
         return shape.reshape(-1, 3) if shape.size == 3 * self._geometry.n_nodes and drawable(shape) else None
 
     def _poses(self, record: StepRecord, when: Timestamp) -> Iterator[tuple[str, bytes]]:
-        nodes, reference = self._nodes(record), _reference(record.reference)
-        if nodes is not None:
-            centre, turn = ring_frames(rings(nodes))
-            if drawable(centre, turn):
-                yield "/tf", self._frames(centre, turn, reference, when)
-                yield "/backbone", _backbone(centre, turn, when)
-        measured = self._measured(record.measurement)
-        if measured is not None:
-            yield "/tip/measured", _pose(*measured, when)
+        nodes, tip = self._nodes(record), self._measured_tip(record.measurement)
+        corners = [part for part in (None if nodes is None else rings(nodes), tip) if part is not None]
+        centre, turn = (
+            ring_frames(np.concatenate(corners)) if corners else (np.zeros((0, 3)), np.zeros((0, 4)))
+        )
+        count = 0 if nodes is None else len(self._geometry.ring_names)
+        reference = _reference(record.reference)
+        if nodes is not None and drawable(centre[:count], turn[:count]):
+            yield from self._shape(centre[:count], turn[:count], reference, when)
+        if tip is not None and drawable(centre[count:], turn[count:]):
+            fine = rounded(centre[count:], _FINE), rounded(turn[count:], _FINE)
+            yield "/tip/measured", self._tip.encode(*fine, when)
         if reference is not None:
-            yield "/tip/reference", _pose(*reference, when)
+            fine = rounded(reference.position[None], _FINE), rounded(reference.turn[None], _FINE)
+            yield "/tip/reference", self._tip.encode(*fine, when)
 
-    def _frames(self, centre: Array, turn: Array, reference: Pose | None, when: Timestamp) -> bytes:
-        names = list(self._geometry.ring_names)
-        if reference is not None:
-            names.append(REFERENCE)
-            centre, turn = np.vstack([centre, reference[0]]), np.vstack([turn, reference[1]])
-        message = FrameTransforms()
-        rows = zip(names, rounded(centre, _COARSE), rounded(turn, _TURN), strict=True)
-        for name, (x, y, z), (i, j, k, w) in rows:
-            frame = message.transforms.add(parent_frame_id=WORLD, child_frame_id=name, timestamp=when)
-            frame.translation.x, frame.translation.y, frame.translation.z = x, y, z
-            frame.rotation.x, frame.rotation.y, frame.rotation.z, frame.rotation.w = i, j, k, w
-        return message.SerializeToString()
+    def _shape(
+        self, centre: Array, turn: Array, reference: _Wanted | None, when: Timestamp
+    ) -> Iterator[tuple[str, bytes]]:
+        places, turns = rounded(centre, _COARSE), rounded(turn, _TURN)
+        if reference is None:
+            yield "/tf", self._frames.encode(places, turns, when)
+        else:
+            wanted = rounded(reference.position[None], _COARSE), rounded(reference.turn[None], _TURN)
+            both = places + wanted[0], turns + wanted[1]
+            yield "/tf", self._frames_and_wanted.encode(*both, when)
+        yield "/backbone", self._backbone.encode(places, turns, when)
 
-    def _measured(self, measurement: Measurement) -> Pose | None:
-        """Return the pose of the end ring from its three markers, None if one of them was not seen."""
+    def _measured_tip(self, measurement: Measurement) -> Array | None:
+        """Return the three markers of the end ring (1, 3, 3) [m], None if one of them was not seen."""
         rows = self._tip_markers
         if rows is None or max(rows) >= len(measurement.nodes) or not measurement.valid[rows].all():
             return None
-        centre, turn = ring_frames(measurement.nodes[rows].astype(np.float64)[None])
-        return (centre[0], turn[0]) if drawable(centre, turn) else None
+        return measurement.nodes[rows].astype(np.float64)[None]
 
 
-def _shape(record: StepRecord) -> Array:
+class _Wanted(NamedTuple):
+    """Wanted end: position (3,) [m] and quaternion x, y, z, w (4,)."""
+
+    position: Array
+    turn: Array
+
+
+def _drawn(record: StepRecord) -> Array:
     return record.estimate.q if record.truth is None else record.truth.q
 
 
@@ -146,26 +155,8 @@ def _tension(record: StepRecord) -> Array:
     return record.estimate.tension if record.truth is None else record.truth.tension
 
 
-def _reference(reference: Reference) -> Pose | None:
+def _reference(reference: Reference) -> _Wanted | None:
     normal = np.array([0.0, 0.0, 1.0]) if reference.normal is None else reference.normal
     if reference.position.size != 3 or normal.size != 3 or not drawable(reference.position, normal):
         return None
-    return reference.position, quaternion_of_normal(normal)
-
-
-def _pose(position: Array, turn: Array, when: Timestamp) -> bytes:
-    message = PoseInFrame(timestamp=when, frame_id=WORLD)
-    _set_pose(message.pose, *rounded(position[None], _FINE), *rounded(turn[None], _FINE))
-    return message.SerializeToString()
-
-
-def _backbone(centre: Array, turn: Array, when: Timestamp) -> bytes:
-    message = PosesInFrame(timestamp=when, frame_id=WORLD)
-    for position, rotation in zip(rounded(centre, _COARSE), rounded(turn, _TURN), strict=True):
-        _set_pose(message.poses.add(), position, rotation)
-    return message.SerializeToString()
-
-
-def _set_pose(pose: Any, position: list[float], turn: list[float]) -> None:
-    pose.position.x, pose.position.y, pose.position.z = position
-    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = turn
+    return _Wanted(reference.position, quaternion_of_normal(normal))

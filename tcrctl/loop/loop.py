@@ -28,8 +28,9 @@ from tcrctl.loop.pacing import Pace, Unpaced
 from tcrctl.loop.safety import SafetyGuard
 from tcrctl.picture.picture import Picture, Unjudged
 from tcrctl.plant.plant import Plant
-from tcrctl.signals import Array, Command, Measurement, StepRecord, Timing
-from tcrctl.trajectory.trajectory import Trajectory, sample_reference
+from tcrctl.signals import Command, Measurement, StepRecord, Timing
+from tcrctl.trajectory.references import References
+from tcrctl.trajectory.trajectory import Trajectory
 
 #: How the reason of a step begins whose drives were held because the picture was in doubt.
 HELD: Final = "held: "
@@ -43,15 +44,6 @@ def step_count(duration: float, period: float) -> int:
 def still(measured: Measurement) -> Command:
     """Return the command that holds the drives where they were measured."""
     return Command(np.zeros_like(measured.drive), measured.drive.copy())
-
-
-def in_periods(ahead: Array, period: float) -> Array:
-    """Return prediction instants ``ahead`` (n,) [s] in periods, so that ``(k + ahead) * period`` is their time.
-
-    An instant that several steps look at then has the same bits in all of them, and so has its reference: in the
-    log all but one are a repetition, which the compressor removes.
-    """
-    return np.asarray(np.round(ahead / period, 9))
 
 
 def _discard(step: StepRecord) -> None:
@@ -73,6 +65,7 @@ class Parts:
         guard: Says when the run must stop; watches one run.
         record: Takes every step.
         picture: Judges what the cameras show; watches one run.
+        references: What of the trajectory belongs to every step.
     """
 
     trajectory: Trajectory
@@ -85,6 +78,10 @@ class Parts:
     guard: SafetyGuard = field(default_factory=SafetyGuard)
     record: Callable[[StepRecord], None] = _discard
     picture: Picture = field(default_factory=Unjudged)
+    references: References = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "references", References(self.trajectory, self.period))
 
 
 class Ticked(NamedTuple):
@@ -116,8 +113,7 @@ def tick(parts: Parts, k: int, applied: Command | None) -> Ticked:
     measured, doubt = parts.picture.judged(seen, parts.pace.elapsed()), parts.picture.doubt
     estimate = parts.estimator.update(measured, still(measured) if applied is None else applied)
     t2 = now()
-    ahead = (k + in_periods(parts.controller.ahead, parts.period)) * parts.period
-    reference = sample_reference(parts.trajectory, t, ahead)
+    reference = parts.references.at(k, parts.controller.ahead)
     wanted, info = parts.controller.control(estimate, reference)
     t3 = now()
     broken = parts.picture.broken(k) or parts.guard.check(k, reference, estimate, wanted, info)

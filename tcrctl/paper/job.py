@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, ClassVar, Final, Protocol
 
 from tcrctl.errors import TcrctlError
 from tcrctl.experiment.prepare import plan, prepare
@@ -88,12 +88,12 @@ class Run:
     Attributes:
         experiment: Its name.
         overrides: Values set in it, as for ``--set``.
-        alone: As in :class:`Job`.
+        alone: As in :class:`Job`: the times of runs do not count.
     """
 
     experiment: str
     overrides: tuple[str, ...] = ()
-    alone: bool = False
+    alone: ClassVar[bool] = False
 
     @property
     def label(self) -> str:

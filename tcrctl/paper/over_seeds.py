@@ -66,7 +66,7 @@ class OverSeeds:
 def experiments_of(row: Row) -> tuple[str, ...]:
     """Return the experiments that a row measures as shipped; none if it measures something else, or time."""
     runs = [job for job in row.jobs if isinstance(job, Run) and not job.overrides]
-    return tuple(job.experiment for job in runs) if len(runs) == len(row.jobs) and row.unit != "ms" else ()
+    return tuple(job.experiment for job in runs) if len(runs) == len(row.jobs) else ()
 
 
 def run_seeds(

@@ -26,7 +26,7 @@ from tcrctl.study.row import Row as StudyRow
 
 MARKDOWN: Final = "paper.md"
 JSON: Final = "paper.json"
-#: Load per core from which on measured times are not to be trusted.
+#: Load per core from which on measured milliseconds are not to be trusted; the bars of time are ratios.
 BUSY: Final = 0.5
 #: No job of the table takes nearly as long [s].
 TIME_LIMIT_S: Final = 900.0
@@ -91,7 +91,7 @@ class Report:
         ]
         if self.load > BUSY * self.cores:
             busy = f"load {self.load:.1f} on {self.cores} cores"
-            notes.append(f"The machine was busy with other work before ({busy}): times are too long.")
+            notes.append(f"The machine was busy with other work before ({busy}): milliseconds are too many.")
         return notes
 
     @property
@@ -188,7 +188,7 @@ def run_paper(
 def run_jobs(
     jobs: Sequence[Job], folder: Path, engine: Engine, begun: Callable[[Job], None]
 ) -> Iterator[Done]:
-    """Run jobs, first those that need the machine for themselves, one by one; yield what became of each.
+    """Run jobs, last those that need the machine for themselves, one by one; yield what became of each.
 
     Args:
         jobs: What to run.
@@ -202,7 +202,7 @@ def run_jobs(
     alone = [(job, folder) for job in jobs if job.alone]
     rest = [(job, folder) for job in jobs if not job.alone]
     with Interruption() as interruption:
-        for some, where in ((alone, ALONE), (rest, engine)):
+        for some, where in ((rest, engine), (alone, ALONE)):
             for (job, _), outcome in outcomes(
                 where,
                 do,

@@ -8,6 +8,7 @@ import numpy as np
 
 from tcrctl.numerics import rotation
 from tcrctl.signals import Array
+from tcrctl.trajectory.own import OwnTrajectory
 from tcrctl.trajectory.trajectory import Trajectory, drives_of
 
 #: Steepest slope of the fading, at its middle.
@@ -67,6 +68,11 @@ class StartBlend:
         self._turn = np.zeros(3)
         if wanted is not None:
             self._turn = rotation.quaternion_log(rotation.rotation_between(wanted[0], normal))
+
+    @property
+    def known_ahead(self) -> bool:
+        """Whether it gives the same poses whenever it is asked: one from elsewhere need not."""
+        return not isinstance(self._trajectory, OwnTrajectory)
 
     @property
     def duration(self) -> float:
