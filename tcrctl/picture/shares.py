@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from tcrctl.picture.kernel import Shape, change_since
-from tcrctl.picture.limits import GIVE, IN_OFFSET, IN_SIDE, IN_TWIST, SIGMAS, USUAL, Limits
+from tcrctl.picture.limits import GIVE, IN_OFFSET, IN_SIDE, IN_TWIST, SHARP, SIGMAS, USUAL, Limits
 from tcrctl.signals import Array
 
 
@@ -63,7 +63,9 @@ def joints(change: Shape, limits: Limits, noise: float) -> tuple[Array, Array, A
         x, y, z = change.offset[i]
         bend = change.bend[i]
         joint, angle = (limits.frame_joint, limits.frame_twist) if i == 0 else (limits.joint, limits.twist)
-        allowed = joint + limits.per_bend * np.hypot(bend[0], bend[1]) + room
+        sine = np.hypot(bend[0], bend[1])
+        sharp = max(0.0, sine - SHARP) if i < n - 1 else 0.0
+        allowed = joint + limits.per_bend * sine + limits.per_sharp * sharp + room
         sideways[i] = _known(np.hypot(x - limits.pull * bend[0], y - limits.pull * bend[1]) / allowed)
         expected, moved = _beside(change.offset[:, 2], i) if limits.along else (0.0, 0.0)
         more = limits.along * moved

@@ -90,7 +90,7 @@ def test_slopes_of_what_is_seen_are_those_of_finite_differences(body, drives):
     shapes, sight = Shapes(body, rests, SPEC.rest), Sight(u, body.robot.n_modules)
 
     def markers(at):
-        return sight.of(at, shapes.at(at)[1])
+        return sight.of(at, [*shapes.at(at)][1])
 
     _, slopes = markers(x)
     for group in u.groups:

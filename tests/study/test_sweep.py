@@ -221,7 +221,7 @@ def test_a_drawn_path_is_the_same_for_the_same_seed_and_is_kept_in_the_row(tmp_p
     (run,) = planned(study)
     loaded = study.load(run.cell)
     assert run.address != address(loaded, run.seed, random_path=False)
-    order = Order(run.address, loaded, run.seed, True, None, "none", tmp_path)
+    order = Order(run.address, loaded, run.seed, True, None, "none", tmp_path, None, tmp_path)
     row = do(order)
     assert row.path["refused"] == 0  # this seed's first path is feasible, and short
     assert row.path["trajectory"]["kind"] == "waypoints"
