@@ -134,6 +134,7 @@ def test_the_quick_start_works_as_it_stands(folder, capsys):
     assert typed("start.md", capsys) == []
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_guide_to_a_robot_of_ones_own_works_as_it_stands(folder, capsys):
     assert typed("robot.md", capsys) == []

@@ -52,6 +52,7 @@ def test_a_log_from_a_script_is_that_of_the_command_line_and_is_replayed_there_w
     assert json.loads(one.stop["summary"])["versions"] == told["versions"]
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_example_compares_two_controllers_and_its_own_one_is_replayed(tmp_path):
     told = python(tmp_path, str(ROOT / "examples" / "python" / "first_steps.py"), str(tmp_path))

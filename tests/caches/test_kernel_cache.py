@@ -73,7 +73,10 @@ def foreign(content):
     return hashlib.sha256(b"no pickle").digest() + b"no pickle"
 
 
-@pytest.mark.parametrize("damage", [cut, flipped, empty, foreign])
+@pytest.mark.parametrize(
+    "damage",
+    [flipped, *(pytest.param(damage, marks=pytest.mark.thorough) for damage in (cut, empty, foreign))],
+)
 def test_a_damaged_file_is_dropped_and_made_again(warm, damage):
     before = {path: path.read_bytes() for path in warm.kernels}
     assert before

@@ -55,7 +55,7 @@ BENCH = SPEC.replace("{kind: ioc}", "{kind: ioc, period_s: 0.1}").replace(
 
 def test_a_period_for_which_the_watchdog_is_too_short_is_refused_where_it_stands(tmp_path: Path) -> None:
     (found,) = problems_of(tmp_path, text=BENCH)
-    assert found.startswith("/standing.yaml:4:25: controller.period_s: is 0.1 s; the watchdog of the PLC")
+    assert found.startswith("/standing.yaml:4:25: controller.period_s: is 0.1 s; the watchdog of the drives")
     assert "at most 0.0667 s" in found
     (found,) = problems_of(tmp_path, "plant={kind: rig, rig: loopback}", "controller.period_s=0.07")
     assert found.startswith("--set controller.period_s: is 0.07 s")

@@ -96,7 +96,7 @@ def test_the_spread_that_is_told_is_the_spread_over_repeated_measurements(tmp_pa
     assert abs(np.mean(errors)) < 1.0
 
 
-@pytest.mark.parametrize("strung_by", ["tension", "length"])
+@pytest.mark.parametrize("strung_by", ["tension", pytest.param("length", marks=pytest.mark.thorough)])
 def test_a_common_scale_of_stiffness_and_mass_is_flagged(tmp_path, strung_by):
     data = static_data(true_robot(LONG), noise_mm=0.1)
     loaded = identification(tmp_path, data, (SPRINGS, CABLES, MASS), LONG, strung_by=strung_by)

@@ -145,6 +145,7 @@ def test_settings_are_strict(own, setting):
     assert SETTINGS[setting] in str(refused.value)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_samples_of_a_letter_at_20_hz_give_the_errors_of_its_strokes_within_5_percent(tmp_path):
     loaded = load_spec("letter_t")
