@@ -19,6 +19,7 @@ from tcrctl.analysis.end_error import angle, distance
 from tcrctl.analysis.history import History
 from tcrctl.analysis.visits import Pass, Visit, visits_of
 from tcrctl.errors import InputError
+from tcrctl.experiment.summary import finite
 from tcrctl.signals import Array
 
 
@@ -90,13 +91,11 @@ class Accuracy:
 
     def as_json(self) -> dict[str, Any]:
         """Return the object of ``tcrctl accuracy --json``; what cannot be said is null."""
-        lists = ([_finite(dataclasses.asdict(item)) for item in items] for items in (self.poses, self.paths))
-        poses, paths = lists
+        found: dict[str, Any] = finite(dataclasses.asdict(self))
         return {
             "status": "success",
-            "end": "true" if self.true else "estimated",
-            "poses": poses,
-            "paths": paths,
+            "end": "true" if found.pop("true") else "estimated",
+            **found,
         }
 
 
@@ -170,7 +169,3 @@ def _apart(pose: Array, others: Array) -> Array:
 def _repeatability(apart: Array) -> float:
     """Return the mean and three standard deviations; NaN of one alone."""
     return float(apart.mean() + 3.0 * apart.std(ddof=1)) if len(apart) > 1 else math.nan
-
-
-def _finite(entry: dict[str, Any]) -> dict[str, Any]:
-    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in entry.items()}

@@ -81,6 +81,21 @@ class RunFolder:
                 return
 
 
+def replace_file(path: Path, text: str) -> None:
+    """Write a file that is there whole or not at all, its folder too; two processes may write the same one.
+
+    Raises:
+        DeviceError: If it cannot be written.
+    """
+    beside = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.write_text(text, encoding="utf-8")
+        os.replace(beside, path)
+    except OSError as error:
+        raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
 def link_latest(folder: Path) -> None:
     """Let ``latest`` beside a run's folder lead to it, where links can be made and nothing else has that name."""
     link = folder.with_name(LATEST)

@@ -170,7 +170,7 @@ class Summary:
             "task": self.task,
             "versions": self.versions,
         }
-        made: dict[str, Any] = _finite({**head, "reason": self.reason, **measures, **tail})
+        made: dict[str, Any] = finite({**head, "reason": self.reason, **measures, **tail})
         return made
 
 
@@ -210,9 +210,10 @@ def _find(result: Any, name: str) -> float | bool | None:
     return result if isinstance(result, int | float) else None
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Return a value for JSON: numbers that are none, at any depth, become null."""
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -18,7 +18,7 @@ from typing import Final
 
 from tcrctl import __version__
 from tcrctl.config import strict_yaml
-from tcrctl.errors import DeviceError
+from tcrctl.experiment.run_folder import replace_file
 from tcrctl.report.strip import strip
 from tcrctl.study.groups import Run, done
 from tcrctl.study.outputs import Findings
@@ -47,12 +47,7 @@ def write_study_page(found: Findings, result: Done, folder: Path) -> Path:
         DeviceError: If the file cannot be written.
     """
     path = folder / PAGE
-    beside = path.with_name(f"{PAGE}.part")
-    try:
-        beside.write_text(study_page(found, result, folder), encoding="utf-8")
-        os.replace(beside, path)
-    except OSError as error:
-        raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error
+    replace_file(path, study_page(found, result, folder))
     return path
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 from tcrctl.errors import InfeasibleError, NoEquilibriumError, StoppedError, TcrctlError, TimeLimitError
 from tcrctl.experiment.prepare import Experiment, plan, prepare
@@ -18,12 +18,10 @@ from tcrctl.experiment.spec import LoadedSpec
 from tcrctl.experiment.summary import Summary
 from tcrctl.experiment.unrecorded import run_unrecorded
 from tcrctl.study.address import program
-from tcrctl.study.row import TIMING, Row, same_every_time
+from tcrctl.study.row import SIGNALS, TIMING, Row, same_every_time
 from tcrctl.study.self_calibration import SelfCalibration
 
 Logs: TypeAlias = Literal["all", "failed", "none"]
-#: Exit codes from here on are signals: the run says nothing of the experiment.
-_SIGNALS: Final = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +94,7 @@ def _done(order: Order, check: Callable[[], None]) -> Row | None:
         _check_feasible(experiment)
     check()
     summary = _run(order, experiment, check)
-    if summary.exit_code >= _SIGNALS:
+    if summary.exit_code >= SIGNALS:
         return None
     made = summary.as_json()
     if summary.reason == str(TimeLimitError(order.timeout_s or 0.0)):

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from tcrctl.errors import DeviceError
+from tcrctl.experiment.run_folder import replace_file
+from tcrctl.experiment.summary import finite
 from tcrctl.study.groups import Difference, Group, differences, done, groups
 from tcrctl.study.settings import StudySpec
 from tcrctl.study.sweep import Done
@@ -57,8 +55,8 @@ class Findings:
     def as_json(self) -> dict[str, Any]:
         """Return groups and differences for programs; infinite and unknown numbers become null."""
         return {
-            "groups": [_plain(dataclasses.asdict(group)) for group in self.groups],
-            "differences": [_plain(dataclasses.asdict(item)) for item in self.differences],
+            "groups": [finite(dataclasses.asdict(group)) for group in self.groups],
+            "differences": [finite(dataclasses.asdict(item)) for item in self.differences],
         }
 
 
@@ -82,23 +80,8 @@ def write(found: Findings, folder: Path, *, parquet: bool = False) -> None:
         DeviceError: If a file cannot be written.
     """
     title = f"# {found.spec.name}\n\n" + (f"{found.spec.description}\n\n" if found.spec.description else "")
-    _replace(folder / TABLE, found.table.csv())
-    _replace(folder / TIMES, found.times.csv())
-    _replace(folder / SUMMARY, title + found.text("markdown"))
+    replace_file(folder / TABLE, found.table.csv())
+    replace_file(folder / TIMES, found.times.csv())
+    replace_file(folder / SUMMARY, title + found.text("markdown"))
     if parquet:
         found.table.write_parquet(folder / PARQUET)
-
-
-def _replace(path: Path, text: str) -> None:
-    beside = path.with_name(f"{path.name}.part")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        os.replace(beside, path)
-    except OSError as error:
-        raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -10,7 +10,7 @@ from tcrctl.experiment.spec import LoadedSpec
 from tcrctl.study.address import address
 from tcrctl.study.design import Cell, cells
 from tcrctl.study.loading import LoadedStudy
-from tcrctl.study.self_calibration import calibration_of
+from tcrctl.study.self_calibration import self_calibration_of
 from tcrctl.study.settings import StudySpec
 
 #: Cells with problems that are told at once.
@@ -56,7 +56,7 @@ def planned(study: LoadedStudy) -> list[PlannedRun]:
 
 def _of_cell(study: LoadedStudy, cell: Cell) -> Iterator[PlannedRun]:
     loaded, random_path = study.load(cell), study.spec.paths == "random"
-    levels, calibration = cell.levels(loaded.spec.name), calibration_of(study, cell, loaded)
+    levels, calibration = cell.levels(loaded.spec.name), self_calibration_of(study, cell, loaded)
     for seed in seeds_of(study.spec, loaded):
         known = None if calibration is None else calibration.address(seed)
         found_by = address(loaded, seed, random_path=random_path, calibration=known)

@@ -18,6 +18,8 @@ FINISHED: Final[tuple[Status, ...]] = ("success", "failed")
 ANSWERS: Final[tuple[Status, ...]] = (*FINISHED, "aborted", "infeasible")
 #: Exit code of what was asked of runs, some of which have no result.
 WITHOUT_RESULT: Final = 3
+#: Exit codes from here on are signals: the run says nothing of the experiment.
+SIGNALS: Final = 128
 #: Results that no two runs have in common.
 TIMING: Final = ("control_ms", "latency_ms", "overruns")
 #: Results that are not of the run, or stand elsewhere in the row.

@@ -8,8 +8,6 @@ What was found is kept in the study's folder under an address of its own, so tha
 from __future__ import annotations
 
 import hashlib
-import json
-import os
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,20 +18,20 @@ from typing import Final
 
 import tcrctl.identify
 from tcrctl.config import strict_yaml
-from tcrctl.errors import InputError, StoppedError
+from tcrctl.errors import InputError, SpecError, StoppedError
 from tcrctl.estimator.calibration_settings import CalibrationSettings
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.experiment.prepare import prepare
 from tcrctl.experiment.run import run_experiment
+from tcrctl.experiment.run_folder import replace_file
 from tcrctl.experiment.spec import LoadedSpec, load_spec
 from tcrctl.study.address import address
 from tcrctl.study.design import Cell
 from tcrctl.study.loading import LoadedStudy
+from tcrctl.study.row import FINISHED, SIGNALS
 
 #: Folder of what was found, in that of the study.
 FOLDER: Final = "calibrations"
-#: Exit codes from here on are signals.
-_SIGNALS: Final = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +63,7 @@ class SelfCalibration:
         Raises:
             StoppedError: If the excitation was stopped, or nothing was found in its log.
             TimeLimitError: From ``check``.
+        DeviceError: If what was found cannot be kept.
         """
         path = folder / f"{self.address(seed)}.yaml"
         found = _kept(path) or self._find(seed, path, check)
@@ -76,17 +75,17 @@ class SelfCalibration:
     def _find(self, seed: int, path: Path, check: Callable[[], None]) -> CalibrationSettings | None:
         with tempfile.TemporaryDirectory() as scratch:
             summary = run_experiment(prepare(self.excitation, seed=seed), out=Path(scratch), check=check)
-            if summary.exit_code >= _SIGNALS:
+            if summary.exit_code >= SIGNALS:
                 return None
             check()
-            if summary.log is None or summary.status not in ("success", "failed"):
+            if summary.log is None or summary.status not in FINISHED:
                 raise StoppedError(f"no self-calibration: the excitation was stopped: {summary.reason}")
             found = _found_in(summary.log, f"{self.excitation.spec.name}, seed {seed}")
         _keep(path, found)
         return found
 
 
-def calibration_of(study: LoadedStudy, cell: Cell, loaded: LoadedSpec) -> SelfCalibration | None:
+def self_calibration_of(study: LoadedStudy, cell: Cell, loaded: LoadedSpec) -> SelfCalibration | None:
     """Return what the runs of a cell begin with; None if they know nothing.
 
     Args:
@@ -95,8 +94,8 @@ def calibration_of(study: LoadedStudy, cell: Cell, loaded: LoadedSpec) -> SelfCa
         loaded: Its experiment.
 
     Raises:
-        SpecError: If it has an estimator that knows no calibration, or one already.
-        InputError: If there is no such excitation.
+        SpecError: If it has an estimator that knows no calibration, or one already; or if there is no such
+            excitation, or it is none.
     """
     wanted = study.spec.calibrate
     if wanted is None or (wanted.cases and cell.case not in wanted.cases):
@@ -106,9 +105,24 @@ def calibration_of(study: LoadedStudy, cell: Cell, loaded: LoadedSpec) -> SelfCa
         study.document.refuse([(("calibrate",), f"the estimator of {name} knows no calibration")])
     elif estimator.calibration != "off":
         study.document.refuse([(("calibrate",), f"{name} has an estimator.calibration already")])
-    given = load_spec(study.beside(wanted.excitation))
+    given = _excitation(study, wanted.excitation)
     spec = given.spec.model_copy(update={"robot": loaded.spec.robot, "plant": loaded.spec.plant})
     return SelfCalibration(replace(given, spec=spec, robot=loaded.robot, plant_robot=loaded.plant_robot))
+
+
+def _excitation(study: LoadedStudy, name: str) -> LoadedSpec:
+    where = ("calibrate", "excitation")
+    try:
+        given = load_spec(study.beside(name))
+    except SpecError:
+        raise
+    except InputError as error:
+        study.document.refuse([(where, f"{error}. {error.hint}" if error.hint else str(error))])
+        raise
+    if given.spec.controller.kind != "open_loop":
+        told = f"{name} is no excitation: its controller is {given.spec.controller.kind}, not open_loop"
+        study.document.refuse([(where, told)])
+    return given
 
 
 @cache
@@ -122,7 +136,7 @@ def identification() -> str:
 
 
 def _found_in(log: Path, source: str) -> CalibrationSettings:
-    from tcrctl.identify.calibration.files import calibration_of as settings_of  # scipy's sparse algebra
+    from tcrctl.identify.calibration.files import calibration_of  # scipy's sparse algebra
     from tcrctl.identify.calibration.self_calibration import calibrate
     from tcrctl.identify.calibration.settings import SelfCalibrationSpec
 
@@ -132,7 +146,7 @@ def _found_in(log: Path, source: str) -> CalibrationSettings:
         raise StoppedError(f"no self-calibration: {error}") from error
     if not found.result.fit.converged:
         raise StoppedError("no self-calibration: the fit did not converge")
-    return settings_of(found.result, found.body.description.modules.count, source)
+    return calibration_of(found.result, found.body.description.modules.count, source)
 
 
 def _kept(path: Path) -> CalibrationSettings | None:
@@ -143,8 +157,9 @@ def _kept(path: Path) -> CalibrationSettings | None:
 
 
 def _keep(path: Path, found: CalibrationSettings) -> None:
-    """Write a file that is there whole or not at all; two workers may write the same one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(f".{os.getpid()}")
-    part.write_text(strict_yaml.dumps(json.loads(found.model_dump_json(exclude_none=True))), encoding="utf-8")
-    part.replace(path)
+    """Write what was found.
+
+    Raises:
+        DeviceError: If it cannot be written.
+    """
+    replace_file(path, strict_yaml.dumps(found.model_dump(mode="json", exclude_none=True)))

@@ -23,7 +23,7 @@ from tcrctl.study.loading import LoadedStudy
 from tcrctl.study.order import Logs, Order, do
 from tcrctl.study.plan import PlannedRun
 from tcrctl.study.row import WITHOUT_RESULT, Row, unanswered
-from tcrctl.study.self_calibration import FOLDER, SelfCalibration, calibration_of
+from tcrctl.study.self_calibration import FOLDER, SelfCalibration, self_calibration_of
 from tcrctl.study.store import Store
 
 #: The study as it was run, in its folder; and where logs go there.
@@ -166,7 +166,7 @@ def _orders(study: LoadedStudy, missing: Sequence[PlannedRun], folder: Path, log
     for run in missing:
         if loaded is None or run.cell is not cell:
             cell, loaded = run.cell, study.load(run.cell)
-            calibration = calibration_of(study, cell, loaded)
+            calibration = self_calibration_of(study, cell, loaded)
         yield Order(
             run.address,
             loaded,

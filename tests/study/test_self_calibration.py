@@ -108,6 +108,16 @@ def test_an_excitation_that_is_stopped_is_a_row_with_its_reason(tmp_path, monkey
     [
         ({"cases": ["other"]}, {}, "calibrate.cases.0: is no case; there are plain, calibrated"),
         ({}, {"estimator": {"kind": "exact"}}, "calibrate: the estimator of stay knows no calibration"),
+        (
+            {"excitation": "./stay.yaml"},
+            {},
+            "calibrate.excitation: ./stay.yaml is no excitation: its controller is ioc, not open_loop",
+        ),
+        (
+            {"excitation": "realistic"},
+            {},
+            "calibrate.excitation: realistic is a study, not an experiment. Start it with: tcrctl sweep realistic",
+        ),
     ],
 )
 def test_what_cannot_be_calibrated_is_refused_at_its_place(tmp_path, calibrate, settings, said):
@@ -120,4 +130,6 @@ def test_what_cannot_be_calibrated_is_refused_at_its_place(tmp_path, calibrate, 
 def test_a_misspelt_excitation_is_one_message(tmp_path, capsys):
     path = study_file(tmp_path, calibrate={"excitation": "excitaton"})
     assert main(["validate", str(path)]) == 2
-    assert "excitaton" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "quick.yaml:" in said
+    assert "calibrate.excitation: there is no experiment named 'excitaton'" in said
