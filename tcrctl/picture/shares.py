@@ -60,38 +60,71 @@ def joints(change: Shape, limits: Limits, noise: float) -> tuple[Array, Array, A
     n, room = len(change.twist), IN_OFFSET * _room(noise)
     sideways, along, twist = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
-        x, y, z = change.offset[i]
-        bend = change.bend[i]
-        joint, angle = (limits.frame_joint, limits.frame_twist) if i == 0 else (limits.joint, limits.twist)
-        sine = np.hypot(bend[0], bend[1])
-        sharp = max(0.0, sine - SHARP) if i < n - 1 else 0.0
-        allowed = joint + limits.per_bend * sine + limits.per_sharp * sharp + room
-        sideways[i] = _known(np.hypot(x - limits.pull * bend[0], y - limits.pull * bend[1]) / allowed)
-        expected, moved = _beside(change.offset[:, 2], i) if limits.along else (0.0, 0.0)
-        more = limits.along * moved
-        if expected != expected:  # nothing is known beside it: but no joint gives more than it can
-            expected, more = 0.0, GIVE
-        along[i] = _known(abs(z - expected) / (limits.joint + more + room))
+        angle = limits.frame_twist if i == 0 else limits.twist
+        sideways[i] = _known(_share_sideways(change, i, limits, room))
+        along[i] = _known(_share_along(change.offset[:, 2], i, limits, room))
         twist[i] = _known(abs(change.twist[i]) / (angle + IN_TWIST * _room(noise)))
     return sideways, along, twist
 
 
 @njit(cache=True, error_model="numpy")
-def _beside(z: Array, i: int) -> tuple[float, float]:
+def _share_sideways(change: Shape, i: int, limits: Limits, room: float) -> float:
+    """Return the change of joint ``i`` sideways, beside where cables pull it, as a share of its limit."""
+    x, y, z = change.offset[i]
+    give, bend = _given(z), change.bend[i]
+    sine = np.hypot(bend[0], bend[1])
+    sharp = max(0.0, sine - SHARP) if i < len(change.twist) - 1 else 0.0
+    joint = limits.frame_joint if i == 0 else limits.joint
+    allowed = joint + limits.per_give * abs(give) + limits.per_bend * sine + limits.per_sharp * sharp + room
+    pull = limits.pull + limits.pull_per_give * give
+    return float(np.hypot(x - pull * bend[0], y - pull * bend[1]) / allowed)
+
+
+@njit(cache=True, error_model="numpy")
+def _share_along(z: Array, i: int, limits: Limits, room: float) -> float:
+    """Return the change of joint ``i`` along the body as a share of its limit; NaN if it is not known.
+
+    Where a joint beside it is not known, those further on stand for it; but where cables end these say little, so a
+    joint that gives no more than it can is right there in any case.
+    """
+    if not limits.along:
+        return float(abs(z[i]) / (limits.joint + room))
+    expected, moved, near = _beside(z, i)
+    share = float(abs(z[i] - expected) / (limits.joint + limits.along * moved + room))
+    return share if near else np.fmin(share, abs(z[i]) / (limits.joint + GIVE + room))
+
+
+@njit(cache=True, error_model="numpy")
+def _beside(z: Array, i: int) -> tuple[float, float, bool]:
     """Return what the joints beside one say that it has moved along the body, and the largest that they have [m].
 
-    Between two joints their mean, at an end the line through the next two; NaN where one of these is not known:
-    where cables end, one joint alone says little of the next. A joint that has moved by more than it can says no
-    more.
+    Between two joints that are known what lies between them, at an end the line through the next two; NaN if there
+    are none. A joint that has moved by more than it can says no more. Third: these joints are the next ones.
     """
-    last = len(z) - 1
-    if last < 2:
-        return np.nan, np.nan
-    before, after = _given(z[max(i - 1, 0)]), _given(z[min(i + 1, last)])
-    if 0 < i < last:
-        return 0.5 * (before + after), np.fmax(abs(before), abs(after))
-    beside = after if i == 0 else before
-    return 2.0 * beside - _given(z[2 if i == 0 else last - 2]), abs(beside)
+    before, after = _nearest(z, i, -1), _nearest(z, i, 1)
+    if before < 0 or after < 0:
+        way = 1 if before < 0 else -1
+        before = after if before < 0 else before
+        after = _nearest(z, before, way) if before >= 0 else before
+    if before < 0 or after < 0:
+        return np.nan, np.nan, False
+    at_before, at_after = _given(z[before]), _given(z[after])
+    slope = (at_after - at_before) / (after - before)
+    between = min(before, after) < i < max(before, after)
+    largest = np.fmax(abs(at_before), abs(at_after)) if between else abs(at_before)
+    near = abs(before - i) == 1 and (after - i == 1 if between else i == 0 or i == len(z) - 1)
+    return at_before + slope * (i - before), largest, near
+
+
+@njit(cache=True, error_model="numpy")
+def _nearest(z: Array, i: int, way: int) -> int:
+    """Return the next joint on one side of a joint that is known; -1 if none is."""
+    j = i + way
+    while 0 <= j < len(z):
+        if z[j] == z[j]:
+            return j
+        j += way
+    return -1
 
 
 @njit(cache=True, error_model="numpy")
