@@ -23,7 +23,7 @@ class DitherSettings(Settings):
     growth_1_s: float = quantity(
         "1/s", "growth of the amplitude by innovation beyond the threshold", 30.0, gt=0
     )
-    speed_part: float = quantity("1", "part of the speed limit that the wave may take", 0.4, gt=0, le=0.8)
+    speed_part: float = quantity("1", "part of the speed limit that the wave may take", 0.6, gt=0, le=0.8)
     release_s: float = quantity("s", "time constant of its decay", 100.0, gt=0)
     filter_s: float = quantity("s", "time constant of the innovation's size", 0.1, gt=0)
     outlier_mm: float = quantity("mm", "largest innovation that counts", 5.0, gt=0)
