@@ -101,19 +101,19 @@ def _beside(z: Array, i: int) -> tuple[float, float, bool]:
     Between two joints that are known what lies between them, at an end the line through the next two; NaN if there
     are none. A joint that has moved by more than it can says no more. Third: these joints are the next ones.
     """
-    before, after = _nearest(z, i, -1), _nearest(z, i, 1)
-    if before < 0 or after < 0:
-        way = 1 if before < 0 else -1
-        before = after if before < 0 else before
-        after = _nearest(z, before, way) if before >= 0 else before
-    if before < 0 or after < 0:
+    one, other = _nearest(z, i, -1), _nearest(z, i, 1)
+    if one < 0:
+        one, other = other, _nearest(z, other, 1)
+    elif other < 0:
+        other = _nearest(z, one, -1)
+    if one < 0 or other < 0:
         return np.nan, np.nan, False
-    at_before, at_after = _given(z[before]), _given(z[after])
-    slope = (at_after - at_before) / (after - before)
-    between = min(before, after) < i < max(before, after)
-    largest = np.fmax(abs(at_before), abs(at_after)) if between else abs(at_before)
-    near = abs(before - i) == 1 and (after - i == 1 if between else i == 0 or i == len(z) - 1)
-    return at_before + slope * (i - before), largest, near
+    there, further = _given(z[one]), _given(z[other])
+    expected = there + (further - there) / (other - one) * (i - one)
+    next_to = abs(one - i) == 1
+    if (i - one) * (i - other) < 0:
+        return expected, max(abs(there), abs(further)), next_to and abs(other - i) == 1
+    return expected, abs(there), next_to and (i == 0 or i == len(z) - 1)
 
 
 @njit(cache=True, error_model="numpy")
