@@ -107,7 +107,14 @@ def self_calibration_of(study: LoadedStudy, cell: Cell, loaded: LoadedSpec) -> S
         study.document.refuse([(("calibrate",), f"{name} has an estimator.calibration already")])
     given = _excitation(study, wanted.excitation)
     spec = given.spec.model_copy(update={"robot": loaded.spec.robot, "plant": loaded.spec.plant})
-    return SelfCalibration(replace(given, spec=spec, robot=loaded.robot, plant_robot=loaded.plant_robot))
+    excitation = replace(
+        given,
+        spec=spec,
+        robot=loaded.robot,
+        robot_path=loaded.robot_path,
+        plant_robot=loaded.plant_robot,
+    )
+    return SelfCalibration(excitation)
 
 
 def _excitation(study: LoadedStudy, name: str) -> LoadedSpec:

@@ -21,7 +21,7 @@ from tcrctl.study.self_calibration import FOLDER
 from tcrctl.study.sweep import folder_of, sweep
 
 EXCITATION = {
-    "name": "short_excitation", "robot": "tcr5x4",
+    "name": "short_excitation", "robot": "tcr600",  # as the shipped one: not that of the runs
     "trajectory": {
         "kind": "excitation", "poses": 7, "held_out": 0, "rest_s": 1.6, "lead_in_s": 1.0, "move_s": 1.0,
         "pulls": {"size_mm": 3.0, "move_s": 0.3, "rest_s": 0.2}, "settle_s": 1.0,
