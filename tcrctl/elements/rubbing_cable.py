@@ -160,6 +160,13 @@ def solve_chain(s: Stretches, cap: Array, first: int, last: int) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def measure_leads(drive: Array, first_hole: np.ndarray, cables: Array, s: Stretches) -> None:
+    """Fill the lengths of the leads, from the actuators to the base ring."""
+    for c in range(drive.shape[0]):
+        s.length[first_hole[c]] = cables[c, sliding_cable.LEAD] + drive[c]
+
+
+@njit(cache=True, error_model="numpy")
 def measure(
     q: Array,
     drive: Array,
@@ -170,10 +177,9 @@ def measure(
     s: Stretches,
 ) -> None:
     """Fill lengths and directions of all stretches; arguments as in ``sliding_cable``."""
+    measure_leads(drive, first_hole, cables, s)
     for c in range(drive.shape[0]):
-        first = first_hole[c]
-        s.length[first] = cables[c, sliding_cable.LEAD] + drive[c]
-        for hole in range(first + 1, first_hole[c + 1]):
+        for hole in range(first_hole[c] + 1, first_hole[c + 1]):
             length, ex, ey, ez = sliding_cable.segment(q, nodes, weights, hole - 1)
             s.length[hole] = length
             s.direction[hole, 0], s.direction[hole, 1], s.direction[hole, 2] = ex, ey, ez

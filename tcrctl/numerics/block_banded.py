@@ -13,6 +13,15 @@ from numba import njit
 
 from tcrctl.signals import Array
 
+#: Doubles in a vector register: columns are quickest in multiples of it, and products take as many rows at once.
+LANES = 4
+
+
+@njit(cache=True, error_model="numpy")
+def padded(count: int) -> int:
+    """Return the number of columns to allocate for ``count`` right-hand sides."""
+    return count + (LANES - count % LANES) % LANES
+
 
 @njit(cache=True, error_model="numpy")
 def factor_diagonal(block: Array) -> bool:
@@ -65,26 +74,39 @@ def solve_upper(U: Array, X: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _subtract_transposed_product(target: Array, left: Array, right: Array) -> None:
-    """Subtract left' right from ``target``, all row-major."""
+    """Subtract left' right from ``target``, all row-major.
+
+    Four rows at a time: an entry of ``target`` is loaded and stored once for four, and the order of the sum stays.
+    """
     rows, cols = target.shape
-    for k in range(left.shape[0]):
+    whole = left.shape[0] - left.shape[0] % LANES
+    for k in range(0, whole, LANES):
         for r in range(rows):
-            factor = left[k, r]
-            if factor != 0.0:
-                for c in range(cols):
-                    target[r, c] -= factor * right[k, c]
+            f0, f1, f2, f3 = left[k, r], left[k + 1, r], left[k + 2, r], left[k + 3, r]
+            for c in range(cols):
+                three = ((target[r, c] - f0 * right[k, c]) - f1 * right[k + 1, c]) - f2 * right[k + 2, c]
+                target[r, c] = three - f3 * right[k + 3, c]
+    for k in range(whole, left.shape[0]):
+        for r in range(rows):
+            for c in range(cols):
+                target[r, c] -= left[k, r] * right[k, c]
 
 
 @njit(cache=True, error_model="numpy")
 def _subtract_product(target: Array, left: Array, right: Array) -> None:
-    """Subtract left right from ``target``, all row-major."""
+    """Subtract left right from ``target``, all row-major; four rows of ``right`` at a time, like the above."""
     rows, cols = target.shape
-    for r in range(rows):
-        for k in range(right.shape[0]):
-            factor = left[r, k]
-            if factor != 0.0:
-                for c in range(cols):
-                    target[r, c] -= factor * right[k, c]
+    whole = right.shape[0] - right.shape[0] % LANES
+    for k in range(0, whole, LANES):
+        for r in range(rows):
+            f0, f1, f2, f3 = left[r, k], left[r, k + 1], left[r, k + 2], left[r, k + 3]
+            for c in range(cols):
+                three = ((target[r, c] - f0 * right[k, c]) - f1 * right[k + 1, c]) - f2 * right[k + 2, c]
+                target[r, c] = three - f3 * right[k + 3, c]
+    for k in range(whole, right.shape[0]):
+        for r in range(rows):
+            for c in range(cols):
+                target[r, c] -= left[r, k] * right[k, c]
 
 
 @njit(cache=True, error_model="numpy")

@@ -13,9 +13,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 
 from tcrctl.plant.reality_settings import CreepBranch
 from tcrctl.signals import Array
+
+
+@njit(cache=True, error_model="numpy")
+def _grow(late: Array, strength: Array, share: Array, elastic: Array) -> Array:
+    """Move late elongations (n_branches, n) by their share of the way; return the sum of their changes (n,) [m]."""
+    grown = np.zeros(elastic.shape[0])
+    for i in range(late.shape[0]):
+        for c in range(elastic.shape[0]):
+            change = share[i] * (strength[i] * elastic[c] - late[i, c])
+            late[i, c] += change
+            grown[c] += change
+    return grown
 
 
 class Creep:
@@ -33,7 +46,4 @@ class Creep:
 
     def grow(self, elastic: Array, h: float) -> Array:
         """Return by how much unstretched lengths grow (n,) [m] in ``h`` [s] under elongations T / k (n,) [m]."""
-        share = -np.expm1(-h / self._time)
-        grown = share[:, None] * (np.outer(self._strength, elastic) - self.late)
-        self.late += grown
-        return np.asarray(grown.sum(axis=0))
+        return _grow(self.late, self._strength, -np.expm1(-h / self._time), elastic)

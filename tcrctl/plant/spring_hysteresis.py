@@ -12,12 +12,27 @@ F_y, which can only take energy: dissipative by construction, whatever the step.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from tcrctl.elements import bar
 from tcrctl.plant.reality_settings import HysteresisSettings
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import RIGID_BARS
 from tcrctl.signals import Array
+
+
+@njit(cache=True, error_model="numpy")
+def _give_way(q: Array, nodes: NDArray[np.int64], elements: Array, longest: float) -> float:
+    """Move unstretched lengths of ``elements`` (n, 4) so that none is stretched by more than ``longest`` [m]."""
+    lost = 0.0
+    for b in range(nodes.shape[0]):
+        length, _, _, _ = bar.direction(q, nodes[b, 0], nodes[b, 1])
+        stretch = length - elements[b, bar.REST]
+        held = min(max(stretch, -longest), longest)
+        elements[b, bar.REST] += stretch - held
+        lost += 0.5 * elements[b, bar.STIFFNESS] * (stretch * stretch - held * held)
+    return lost
 
 
 class SpringHysteresis:
@@ -47,10 +62,7 @@ class SpringHysteresis:
 
     def give_way(self, q: Array) -> float:
         """Cut forces down after an internal step to ``q`` (3 n_nodes,) [m]; return the energy lost [J]."""
-        stretch = self._lengths(q) - self._own[:, bar.REST]
-        held = np.clip(stretch, -self.yield_length, self.yield_length)
-        self._own[:, bar.REST] += stretch - held
-        return float(0.5 * self._own[:, bar.STIFFNESS] @ (stretch**2 - held**2))
+        return _give_way(q, self._nodes, self._own, self.yield_length)
 
     def _lengths(self, q: Array) -> Array:
         ends = q.reshape(-1, 3)[self._nodes]

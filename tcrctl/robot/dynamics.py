@@ -61,7 +61,10 @@ class Rule(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Arrays of one internal step: predictors and the load of (*)."""
+    """Arrays of one internal step: predictors and the load of (*), and what one step leaves to the next.
+
+    ``settled`` is 1 if the last one converged: then the workspace belongs to ``q``, else 0.
+    """
 
     q: Array
     q0: Array
@@ -72,6 +75,7 @@ class Scratch(NamedTuple):
     bar_rate: Array
     cable_before: Array
     lead: Array
+    settled: Array
 
 
 def rest_state(q: Array, drive: Array, slip: Slip | None = None) -> State:
@@ -128,6 +132,7 @@ def make_scratch(model: Model) -> Scratch:
         np.zeros(bars),
         np.zeros(m),
         np.array([0.0, 0.0, -1.0]),
+        np.zeros(1),
     )
 
 
@@ -136,12 +141,24 @@ def lengths_before(
     model: Model, q: Array, v: Array, drive: Array, speed: Array, lag: float, s: Scratch, ws: Workspace
 ) -> None:
     """Fill s.bar_before and s.cable_before with l + lag dl/dt at (q, v) and (d, u)."""
-    bar.lengths_and_rates(q, v, model.bar_nodes, s.bar_before, s.bar_rate)
-    for b in range(s.bar_before.shape[0]):
-        s.bar_before[b] += lag * s.bar_rate[b]
     sliding_cable.path_gradients(
         q, model.first_hole, model.hole_nodes, model.hole_weights, model.cables, ws.length, ws.G
     )
+    _bars_before(model, q, v, lag, s)
+    _cables_before(v, drive, speed, lag, s, ws)
+
+
+@njit(cache=True, error_model="numpy")
+def _bars_before(model: Model, q: Array, v: Array, lag: float, s: Scratch) -> None:
+    """Fill s.bar_before with l + lag dl/dt."""
+    bar.lengths_and_rates(q, v, model.bar_nodes, s.bar_before, s.bar_rate)
+    for b in range(s.bar_before.shape[0]):
+        s.bar_before[b] += lag * s.bar_rate[b]
+
+
+@njit(cache=True, error_model="numpy")
+def _cables_before(v: Array, drive: Array, speed: Array, lag: float, s: Scratch, ws: Workspace) -> None:
+    """Fill s.cable_before with l + d + lag (dl/dt + u), where ``ws`` has path lengths and gradients."""
     for c in range(drive.shape[0]):
         rate = speed[c]
         if lag != 0.0:
@@ -151,14 +168,40 @@ def lengths_before(
 
 
 @njit(cache=True, error_model="numpy")
-def _begin_slip(
-    model: Model, q: Array, drive: Array, h: float, slip: Slip | None, s: Any, lead: Array
+def _known(q: Array, s: Scratch) -> bool:
+    """Tell whether the last internal step converged, and to ``q``: then the workspace belongs to it."""
+    if s.settled[0] == 0.0:
+        return False
+    same = True
+    for k in range(q.shape[0]):
+        same = same and q[k] == s.q[k]
+    return same
+
+
+@njit(cache=True, error_model="numpy")
+def _begin_cables(
+    model: Model,
+    x: State,
+    speed: Array,
+    h: float,
+    slip: Slip | None,
+    stretches: Any,
+    s: Scratch,
+    ws: Workspace,
 ) -> None:
-    """Start an internal step of cables that rub."""
+    """Start an internal step of the cables, whose geometry at x.q may be known from the end of the last one."""
+    first, holes, weights, cables = model.first_hole, model.hole_nodes, model.hole_weights, model.cables
+    known = _known(x.q, s)
     if slip is not None:
-        holes, weights = model.hole_nodes, model.hole_weights
-        rubbing_cable.measure(q, drive, model.first_hole, holes, weights, model.cables, s)
-        rubbing_cable.begin(slip, h, lead, model.first_hole, s)
+        if known:
+            rubbing_cable.measure_leads(x.drive, first, cables, stretches)
+        else:
+            rubbing_cable.measure(x.q, x.drive, first, holes, weights, cables, stretches)
+        rubbing_cable.begin(slip, h, s.lead, first, stretches)
+    else:
+        if not known:
+            sliding_cable.path_gradients(x.q, first, holes, weights, cables, ws.length, ws.G)
+        _cables_before(x.v, x.drive, speed, 0.5 * h, s, ws)
 
 
 @njit(cache=True, error_model="numpy")
@@ -174,8 +217,8 @@ def try_step(
 ) -> Outcome:
     """Try one internal step of size ``h`` [s]; changes ``x`` only if it converges."""
     c = coefficients(rho, h)
-    lengths_before(model, x.q, x.v, x.drive, speed, 0.5 * h, s, ws)
-    _begin_slip(model, x.q, x.drive, h, x.slip, ws.stretches, s.lead)
+    _bars_before(model, x.q, x.v, 0.5 * h, s)
+    _begin_cables(model, x, speed, h, x.slip, ws.stretches, s, ws)
     inertia = c.acceleration + model.damping * c.velocity
     for k in range(x.q.shape[0]):
         aux = (x.acceleration[k] - c.alpha_m * x.auxiliary[k]) / (1.0 - c.alpha_m)
@@ -188,6 +231,7 @@ def try_step(
         s.drive[i] = x.drive[i] + h * speed[i]
     load = Load(inertia, 2.0 / h, s.nodal, s.bar_before, s.cable_before, x.slip)
     outcome = minimise(model, s.q, s.drive, load, ws, TOLERANCE, np.int64(MAX_ITERATIONS), np.bool_(False))
+    s.settled[0] = 1.0 if outcome.converged else 0.0
     if outcome.converged:
         _finish_slip(model, x.slip, ws.stretches)
         for k in range(x.q.shape[0]):

@@ -21,6 +21,7 @@ from numba import njit
 
 from tcrctl.elements import bar, rubbing_cable, sliding_cable
 from tcrctl.elements.rubbing_cable import Slip, Stretches
+from tcrctl.numerics.block_banded import padded
 from tcrctl.robot import tangent
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
@@ -61,7 +62,7 @@ class Workspace(NamedTuple):
         tension: λ (m,) [N]; that at the drives where cables rub.
         axial: k_c = ∂λ/∂(l + d) of taut cables, 0 of slack ones (m,) [N/m].
         length: Path lengths l (m,) [m].
-        columns: Cable columns and right-hand side of ``linear.couple`` (n_free, m + 1).
+        columns: Cable columns and right-hand side of ``linear.couple``, then zeros (n_free, padded(m + 1)).
         small: Its factor of the cable coupling (m, m).
         stretches: Of cables that rub; None without friction.
     """
@@ -91,7 +92,7 @@ def _stretches(model: Model, rows: int) -> Stretches:
         alone=np.zeros(holes),
         knots=np.zeros((2, 4 * holes + 4)),
         groups=np.zeros(1, dtype=np.int64),
-        columns=np.zeros(size * (rows + 1)),
+        columns=np.zeros(size * padded(rows + 1)),
         small=np.zeros(rows * rows),
     )
 
@@ -110,7 +111,7 @@ def make_workspace(model: Model, *, rubbing: bool = False) -> Workspace:
         tension=np.zeros(model.cables.shape[0]),
         axial=np.zeros(m),
         length=np.zeros(model.cables.shape[0]),
-        columns=np.zeros((SIZE * n, m + 1)),
+        columns=np.zeros((SIZE * n, padded(m + 1))),
         small=np.zeros((m, m)),
         stretches=_stretches(model, m) if rubbing else None,
     )

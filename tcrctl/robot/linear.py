@@ -72,7 +72,8 @@ def in_use(ws: Workspace, stretches: Stretches | None) -> Workspace:
     if stretches is None:
         return ws
     r, size = stretches.groups[0], ws.r.shape[0]
-    columns = stretches.columns[: size * (r + 1)].reshape((size, r + 1))
+    wide = block_banded.padded(r + 1)
+    columns = stretches.columns[: size * wide].reshape((size, wide))
     small = stretches.small[: r * r].reshape((r, r))
     return Workspace(
         ws.K, ws.U, ws.r, ws.G[:r], ws.tension, ws.axial[:r], ws.length, columns, small, stretches
@@ -81,7 +82,7 @@ def in_use(ws: Workspace, stretches: Stretches | None) -> Workspace:
 
 @njit(cache=True, error_model="numpy")
 def couple(ws: Workspace, b: Array) -> None:
-    """Fill columns = U'^-1 [G'R, b] = [W, U'^-1 b] and small = Cholesky factor of P = I + W'W."""
+    """Fill columns = U'^-1 [G'R, b, 0] = [W, U'^-1 b, 0] and small = Cholesky factor of P = I + W'W."""
     m, size = ws.axial.shape[0], b.shape[0]
     X = ws.columns
     for c in range(m):
@@ -90,6 +91,8 @@ def couple(ws: Workspace, b: Array) -> None:
             X[i, c] = root * ws.G[c, 3 * FIXED + i]
     for i in range(size):
         X[i, m] = b[i]
+        for c in range(m + 1, X.shape[1]):
+            X[i, c] = 0.0
     block_banded.solve_forward(ws.U, X)
     for c in range(m):
         for k in range(m):

@@ -15,6 +15,8 @@ from tcrctl.numerics.generalized_alpha import coefficients
 from tcrctl.robot import dynamics
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, assemble, make_workspace, residual
 from tcrctl.robot.equilibrium import equilibrium, static_load
+from tcrctl.robot.robot import hole_friction
+from tcrctl.robot.sections import FrictionSettings
 
 ROBOTS = ["tcr600", "tcr700", "tcr5x4"]
 RHO = 0.8
@@ -296,3 +298,24 @@ def test_a_step_with_the_actuation_nodes_eliminated_is_that_of_the_bordered_syst
     motion.advance(1.5 * speeds(robot), 2e-3, 2e-3)
     np.testing.assert_allclose(motion.state.q, q, atol=1e-10)
     np.testing.assert_allclose(motion.work.tension, multiplier, atol=1e-5)
+
+
+@pytest.mark.parametrize("rubs", [False, True])
+def test_what_a_step_knows_of_the_last_one_changes_nothing(tcr5x4, rubs):
+    """The cables' geometry is not measured again where the last internal step ended: bit for bit the same."""
+    model, still = tcr5x4.model, np.zeros(4)
+
+    def moved(fresh):
+        holes = hole_friction(FrictionSettings(coefficient=0.1), model.first_hole)
+        slip = dynamics.unworn(model, tcr5x4.rest.q, still, tcr5x4.rest.tension, holes) if rubs else None
+        state = dynamics.rest_state(tcr5x4.rest.q, still, slip)
+        work, scratch = make_workspace(model, rubbing=rubs), dynamics.make_scratch(model)
+        for k in range(40):
+            if fresh:
+                work, scratch = make_workspace(model, rubbing=rubs), dynamics.make_scratch(model)
+            speed, rule = 0.05 * np.cos(0.2 * k + np.arange(4)), dynamics.Rule(1e-3, RHO)
+            done = dynamics.advance(model, state, speed, 2e-3, rule, tcr5x4.weight, work, scratch)
+            assert done[0]
+        return state.q
+
+    assert np.array_equal(moved(fresh=False), moved(fresh=True))
