@@ -42,6 +42,7 @@ def diff(
 
 
 def _print(found: LogDiff) -> None:
+    from tcrctl.experiment.headline import count
     from tcrctl.log.comparison import table
 
     only_a, only_b, both = found.steps
@@ -49,7 +50,7 @@ def _print(found: LogDiff) -> None:
     _table("provenance", ("name", "A", "B"), _entries(found.provenance))
     _table("steps", ("quantity", "first step", "steps", "largest", "rms"), table(found.deviations))
     rest = f"; {only_a} only in A, {only_b} only in B" if only_a or only_b else ""
-    print(f"{'same' if found.same else 'different'}: {both} steps in both{rest}")
+    print(f"{'same' if found.same else 'different'}: {count(both, 'step')} in both{rest}")
 
 
 def _entries(entries: Iterable[Entry]) -> Iterator[tuple[str, ...]]:
