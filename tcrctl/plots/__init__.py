@@ -85,11 +85,12 @@ def save(figure: Figure, path: Path, look: Look = USUAL) -> None:
     Raises:
         DeviceError: If the file cannot be written.
     """
+    from tcrctl.plots.legends import at_peace
     from tcrctl.plots.style import printed
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with printed(look):
+        with printed(look), at_peace(figure):
             figure.savefig(path, metadata=_METADATA.get(path.suffix))
     except OSError as error:
         raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error
