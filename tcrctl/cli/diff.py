@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcrctl.cli.log_file import log_path
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import AsJson, Quiet
 
 if TYPE_CHECKING:
     from tcrctl.analysis.diff import Entry, LogDiff
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 def diff(
     a: Annotated[Path, typer.Argument(metavar="A", help="Log of a run.", parser=log_path)],
     b: Annotated[Path, typer.Argument(metavar="B", help="Log of another run.", parser=log_path)],
+    quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
     """Compare two logs: settings, provenance, and every quantity of every step.
@@ -35,7 +36,7 @@ def diff(
     found = compare(a, b)
     if as_json:
         print(json.dumps(found.as_json()))
-    else:
+    elif not quiet:
         _print(found)
     if not found.same:
         raise typer.Exit(3)
