@@ -70,6 +70,7 @@ def export_log(
 
     Raises:
         InputError: If ``path`` is not a log, a file exists and ``force`` is False, or pyarrow is not installed.
+        DeviceError: If the folder of ``out`` cannot be made.
         LogError: If the log is damaged or a file cannot be written.
     """
     write = _parquet() if form == "parquet" else _FORMS[form]
