@@ -21,7 +21,7 @@ from tcrctl.analysis.result import run_result
 from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.recover import recover
-from tcrctl.errors import DeviceError, InputError, LogError, TcrctlError
+from tcrctl.errors import DeviceError, InputError, TcrctlError
 from tcrctl.log.columns import COLUMNS, meanings
 from tcrctl.log.reader import read_log
 from tcrctl.signals import Timing
