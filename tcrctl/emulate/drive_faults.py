@@ -12,7 +12,6 @@ from tcrctl.emulate import winch_faults
 from tcrctl.plant.rig.settings import Dynamixel
 
 if TYPE_CHECKING:
-    from tcrctl.emulate.fault_script import Fault
     from tcrctl.plant.rig.settings import RigFile
 
 _OF_A_PLC = {name: frozenset(kind.arguments) for name, kind in plc_faults.FAULTS.items()}
@@ -36,16 +35,16 @@ class Drives:
     faults: Mapping[str, Collection[str]]
     axes: tuple[int, ...]
 
-    def wrong(self, fault: Fault) -> Iterator[Finding]:
-        """Yield what these drives cannot do of a fault."""
-        taken = self.faults.get(fault.plc or "")
+    def wrong(self, fault: str, given: Mapping[str, float]) -> Iterator[Finding]:
+        """Yield what these drives cannot do of a fault, and where a script says it."""
+        taken = self.faults.get(fault)
         if taken is None:
-            yield ("plc",), f"have no fault {fault.plc}; they have {', '.join(self.faults)}"
+            yield ("plc",), f"have no fault {fault}; they have {', '.join(self.faults)}"
             return
-        for name, value in fault.with_.items():
+        for name, value in given.items():
             if name not in taken:
                 known = ", ".join(sorted(taken)) or "no arguments"
-                yield ("with", name), f"have a fault {fault.plc} that takes {known}"
+                yield ("with", name), f"have a fault {fault} that takes {known}"
             elif name == "axis" and value not in self.axes:
                 yield ("with", name), f"have no axis {value:g}; they have {', '.join(map(str, self.axes))}"
 

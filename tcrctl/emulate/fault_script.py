@@ -134,9 +134,10 @@ def _strangers(
     """Return what is named in a fault and nobody on the rig has."""
     if robots is not None and fault.robot is not None and fault.robot not in robots:
         yield (*at, "robot"), f"there is no robot {fault.robot} on the rig; there are {', '.join(robots)}"
-    for name, drives in (robots or {}).items() if fault.plc is not None else ():
-        if fault.robot in (None, name):
-            yield from (((*at, *key), f"the drives of {name} {what}") for key, what in drives.wrong(fault))
+    for name, drives in (robots or {}).items():
+        if fault.plc is not None and fault.robot in (None, name):
+            found = drives.wrong(fault.plc, fault.with_)
+            yield from (((*at, *key), f"the drives of {name} {what}") for key, what in found)
     for key, value in fault.cameras.items() if isinstance(fault.cameras, dict) else ():
         known = known_names(key, markers or ())
         if markers is None or not known:
