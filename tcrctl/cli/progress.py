@@ -29,7 +29,7 @@ class SpokenProgress:
     def say(self, what: str, done: int, total: int | None) -> None:
         """Print what is done and how long the rest takes, if it is time to."""
         elapsed = self._clock() - self._begin
-        if elapsed < self._next:
+        if not done or elapsed < self._next:
             return
         self._next = elapsed + min(elapsed, _LONGEST_S)
         left = f" of {total}, {elapsed * (total - done) / done:.0f} s left" if total and done else ""
