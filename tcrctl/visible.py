@@ -13,7 +13,8 @@ _ACTING: Final = (
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff]"
 )
 _HIDDEN: Final = re.compile(_ACTING)
-_STYLE_OR_HIDDEN: Final = re.compile(rf"\x1b\[[0-9;]*m|{_ACTING}")
+_STYLE: Final = re.compile(r"\x1b\[[0-9;]*m")
+_STYLE_OR_HIDDEN: Final = re.compile(rf"{_STYLE.pattern}|{_ACTING}")
 _FORMULA: Final = tuple("=+-@\t\r\uff1d\uff0b\uff0d\uff20")
 
 
@@ -27,6 +28,11 @@ def visible(text: str, *, keep_styles: bool = False) -> str:
     if keep_styles:
         return _STYLE_OR_HIDDEN.sub(lambda found: found[0] if len(found[0]) > 1 else _spelt(found), text)
     return _HIDDEN.sub(_spelt, text)
+
+
+def unstyled(text: str) -> str:
+    """Return text without the colours and weights of a terminal."""
+    return _STYLE.sub("", text)
 
 
 def _spelt(found: re.Match[str]) -> str:

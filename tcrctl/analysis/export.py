@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from tcrctl.analysis.table import ERRORS, UNIT_SUFFIX, Series, errors, table
 from tcrctl.errors import InputError, LogError
+from tcrctl.experiment.run_folder import make_folder_for
 from tcrctl.log.columns import COLUMNS
 from tcrctl.log.reader import Log, read_log
 from tcrctl.visible import cell
@@ -69,10 +70,12 @@ def export_log(
 
     Raises:
         InputError: If ``path`` is not a log, a file exists and ``force`` is False, or pyarrow is not installed.
+        DeviceError: If the folder of ``out`` cannot be made.
         LogError: If the log is damaged or a file cannot be written.
     """
     write = _parquet() if form == "parquet" else _FORMS[form]
     target, log = Path(out), read_log(path)
+    make_folder_for(target)
     if form in ARRAYS:
         arrays = _arrays(log)
         _write(target, write, arrays, force)

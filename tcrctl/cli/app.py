@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shlex
 import sys
 import traceback
 from collections.abc import Callable, MutableMapping, Sequence
@@ -138,6 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run_verb(given: list[str]) -> int:
     as_json = "--json" in given
     try:
+        _refuse_empty(given)
         build_app()(args=given, prog_name="tcrctl")
     except SystemExit as end:  # how typer ends, always
         if end.code == 2 and as_json:
@@ -150,6 +152,13 @@ def _run_verb(given: list[str]) -> int:
     except Exception as error:
         return _report(_known(error), error, as_json)
     return 0
+
+
+def _refuse_empty(given: list[str]) -> None:
+    """Raise an InputError if an argument is empty: as a path it would be the working directory."""
+    if "" in given:
+        hint = "A variable of the shell that is not set?"
+        raise InputError(f"argument {given.index('') + 1} is empty: {shlex.join(given)}", hint=hint)
 
 
 def _with_delivery(code: int, given: list[str], output: Output) -> int:
@@ -177,6 +186,8 @@ def _known(error: Exception) -> TcrctlError:
     if isinstance(error, TcrctlError):
         return error
     if isinstance(error, OSError):
+        if error.errno == errno.ENOENT and error.filename is None:  # what getcwd says
+            return DeviceError("the folder that the program was started in is gone")
         return (
             InputError(f"{error.filename}: {error.strerror}")
             if _is_bad_name(error)

@@ -69,8 +69,10 @@ def _assumed(changes: Sequence[str]) -> SelfCalibrationSpec:
 
 def _print(result: CalibrationResult) -> None:
     from tcrctl.cli.table import print_facts
+    from tcrctl.experiment.headline import count
 
-    print(f"{result.rests} rests, {len(result.unknowns)} unknowns, {result.fit.iterations} steps")
+    said = ((result.rests, "rest"), (len(result.unknowns), "unknown"), (result.fit.iterations, "step"))
+    print(", ".join(count(*each) for each in said))
     rows = [
         ("as described", _distances(result.before)),
         ("found", _distances(result.after)),

@@ -1,14 +1,28 @@
-"""Tables and bars in colour; what stands in their cells comes from anywhere."""
+"""Tables and bars in colour, where there may be any; what stands in their cells comes from anywhere."""
 
 from __future__ import annotations
 
+import os
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from tcrctl.visible import visible
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+#: Terminals, as TERM names them, that write what they are sent and nothing else.
+_PLAIN: Final = ("dumb", "unknown")
+
+
+def has_styles(stream: TextIO) -> bool:
+    """Whether a stream may be sent escape codes: a terminal that obeys them, and nobody has asked for none.
+
+    NO_COLOR is taken for more than it says: who sets it wants to read or to store plain text.
+    """
+    if os.environ.get("NO_COLOR"):
+        return False
+    return stream.isatty() and os.environ.get("TERM", "").lower() not in _PLAIN
 
 
 def console(*, stderr: bool = False) -> Console:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcrctl.cli.log_file import log_path
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import AsJson, Quiet
 
 if TYPE_CHECKING:
     from tcrctl.analysis.diff import Entry, LogDiff
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 def diff(
     a: Annotated[Path, typer.Argument(metavar="A", help="Log of a run.", parser=log_path)],
     b: Annotated[Path, typer.Argument(metavar="B", help="Log of another run.", parser=log_path)],
+    quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
     """Compare two logs: settings, provenance, and every quantity of every step.
@@ -35,13 +36,14 @@ def diff(
     found = compare(a, b)
     if as_json:
         print(json.dumps(found.as_json()))
-    else:
+    elif not quiet:
         _print(found)
     if not found.same:
         raise typer.Exit(3)
 
 
 def _print(found: LogDiff) -> None:
+    from tcrctl.experiment.headline import count
     from tcrctl.log.comparison import table
 
     only_a, only_b, both = found.steps
@@ -49,7 +51,7 @@ def _print(found: LogDiff) -> None:
     _table("provenance", ("name", "A", "B"), _entries(found.provenance))
     _table("steps", ("quantity", "first step", "steps", "largest", "rms"), table(found.deviations))
     rest = f"; {only_a} only in A, {only_b} only in B" if only_a or only_b else ""
-    print(f"{'same' if found.same else 'different'}: {both} steps in both{rest}")
+    print(f"{'same' if found.same else 'different'}: {count(both, 'step')} in both{rest}")
 
 
 def _entries(entries: Iterable[Entry]) -> Iterator[tuple[str, ...]]:

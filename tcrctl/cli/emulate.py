@@ -108,12 +108,13 @@ def _built(
     rig: str, faults: Path | None, settings: EmulationSettings
 ) -> tuple[EmulatedBench, FaultScript | None]:
     from tcrctl.emulate.bench import EmulatedBench, marker_names
+    from tcrctl.emulate.drive_faults import drives_of
     from tcrctl.emulate.fault_script import load_fault_script
     from tcrctl.experiment.compilation import announced_compilation
     from tcrctl.plant.rig.file import read_rig
 
     file, *_ = read_rig(rig)
-    script = None if faults is None else load_fault_script(faults, file.robots, marker_names(file))
+    script = None if faults is None else load_fault_script(faults, drives_of(file), marker_names(file))
     with announced_compilation(_say):
         return EmulatedBench(file, settings), script
 

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.console import console
+from tcrctl.cli.console import console, has_styles
 from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, SideBySide, unfolded
+from tcrctl.cli.progress import SpokenProgress
 
 if TYPE_CHECKING:
     from tcrctl.identify.identification import Progress
@@ -227,11 +228,13 @@ def _write(loaded: LoadedIdentification, result: Result, out: Path) -> tuple[Pat
 
 
 def _headline(loaded: LoadedIdentification) -> str:
+    from tcrctl.experiment.headline import count
+
     spec = loaded.spec
-    amount = [f"{len(loaded.configurations)} configurations"] if loaded.configurations else []
-    amount += [f"{len(loaded.logs)} logs"] if loaded.logs else []
+    amount = [count(len(loaded.configurations), "configuration")] if loaded.configurations else []
+    amount += [count(len(loaded.logs), "log")] if loaded.logs else []
     return (
-        f"{spec.name}: robot {loaded.robot.name}, {len(loaded.parameters)} parameters, "
+        f"{spec.name}: robot {loaded.robot.name}, {count(len(loaded.parameters), 'parameter')}, "
         f"{' and '.join(amount)}, method {spec.method}"
     )
 
@@ -248,6 +251,12 @@ def _progress_line(*, shown: bool) -> Iterator[Progress]:
     """
     if not (shown and sys.stderr.isatty()):
         yield lambda what, evaluations, best_mm, most: None
+        return
+    if not has_styles(sys.stderr):
+        spoken = SpokenProgress()
+        yield lambda what, evaluations, best_mm, most: spoken.say(
+            f"{what}, best {best_mm:.4g} mm, evaluations", evaluations, most
+        )
         return
     import time
 

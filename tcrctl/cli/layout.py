@@ -8,11 +8,10 @@ broken. Without a width, which is what a pipe has, every row is one line, so tha
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, TextIO
 
 _GAP: Final = "  "
 #: A cell of words is not made narrower than this.
@@ -20,16 +19,27 @@ _NARROWEST: Final = 16
 #: A row of more lines is a tower; if so large a share of the rows are, all are written as paragraphs.
 _TALLEST: Final = 4
 _MANY: Final = 0.25
+#: Columns of a terminal that does not say.
+_USUAL: Final = 80
 
 Lines = list[str]
 
 
-def width() -> int | None:
-    """Return how many columns stdout has; None if it is no terminal and nobody told."""
-    told = os.environ.get("COLUMNS", "")
+def width(stream: TextIO | None = None) -> int | None:
+    """Return how many columns a stream has; None if it is no terminal and nobody told.
+
+    Args:
+        stream: Where the text goes; stdout if left out.
+    """
+    told, where = os.environ.get("COLUMNS", ""), stream or sys.stdout
     if told.isdecimal() and int(told) > 0:
         return int(told)
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    if not where.isatty():
+        return None
+    try:
+        return os.get_terminal_size(where.fileno()).columns or _USUAL
+    except (OSError, ValueError):
+        return _USUAL
 
 
 def laid_out(
@@ -58,10 +68,26 @@ def fact(name: str, text: str, at: int, columns: int | None) -> Lines:
     room = None if columns is None else columns - at
     if room is None or len(text) <= room:
         return [f"{name.ljust(at)}{text}".rstrip()]
-    if room < _NARROWEST:
+    if room < max(_NARROWEST, _longest_word(text)):
         return [name, *_words(text, max((columns or 0) - len(_GAP), 1), _GAP)]
     first, *more = _words(text, room)
     return [f"{name.ljust(at)}{first}", *(" " * at + line for line in more)]
+
+
+def message(text: str, columns: int | None) -> str:
+    """Return a message with breaks between words where its lines are too long; styled lines stay as they are."""
+    if columns is None or len(text) <= columns:
+        return text
+    return "".join(_broken(line, columns) for line in text.splitlines(keepends=True))
+
+
+def _broken(line: str, columns: int) -> str:
+    body = line.rstrip("\n")
+    if len(body) <= columns or "\x1b" in body:
+        return line
+    first, *more = _words(body, columns)
+    rest = _words(" ".join(more), columns - len(_GAP), _GAP) if more else []
+    return "\n".join([first, *rest]) + line[len(body) :]
 
 
 def _are_towers(rows: Sequence[Lines]) -> bool:

@@ -63,9 +63,10 @@ def _experiment(path: Path, start: str) -> str:
 
 def _write(path: Path, text: str) -> None:
     from tcrctl.errors import DeviceError, InputError
+    from tcrctl.experiment.run_folder import make_folder_for
 
+    make_folder_for(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcrctl.cli.console import console
+from tcrctl.cli.console import console, has_styles
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
 from tcrctl.cli.table import print_facts, print_table
 
@@ -100,7 +100,7 @@ def _progress(count: int, *, quiet: bool) -> Iterator[Told]:
     if quiet:
         yield (lambda job: None), (lambda done: None)
         return
-    if not sys.stderr.isatty():
+    if not has_styles(sys.stderr):
         yield (lambda job: None), _Counter(count).say
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn

@@ -29,6 +29,7 @@ def recover(
       tcrctl recover log.mcap
       tcrctl recover log.mcap -o mended.mcap && tcrctl replay mended.mcap
     """
+    from tcrctl.experiment.headline import count
     from tcrctl.log.recover import recover as mend
 
     result = mend(log, out or log.with_name(f"{log.stem}.recovered.mcap"))
@@ -48,6 +49,6 @@ def recover(
     for damage in result.damages:
         print(f"damaged and left out: {damage}", file=sys.stderr)
     why = "unfinished or damaged; steps may be missing" if result.lossy else "complete"
-    print(f"{result.steps} steps saved, the input was {why}", file=sys.stderr)
+    print(f"{count(result.steps, 'step')} saved, the input was {why}", file=sys.stderr)
     if result.lossy:
         raise typer.Exit(3)

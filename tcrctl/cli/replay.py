@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcrctl.cli.log_file import LogFile
-from tcrctl.cli.options import AsJson, Overrides, unfolded
+from tcrctl.cli.options import AsJson, Overrides, Quiet, unfolded
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -67,6 +67,7 @@ def replay(
     out: Out = None,
     plot: Plot = None,
     plugins: Plugins = None,
+    quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
     """Feed a log to its own controller, and compare commands, estimates and tensions bit for bit.
@@ -98,7 +99,8 @@ def replay(
     if plot is not None:
         check_format(plot)
         drawing = WhatIf()
-    with announced_compilation(_say), progress_bar("replay") as progress:
+    say = _nothing if quiet else _say
+    with announced_compilation(say), progress_bar("replay", shown=not quiet) as progress:
         found = run_replay(
             log,
             overrides=overrides or (),
@@ -107,14 +109,14 @@ def replay(
             out=out,
             plugins=plugins,
             watch=None if drawing is None else drawing.add,
-            announce=_announce,
+            announce=lambda changes: _announce(changes, say),
             progress=progress,
         )
     if plot is not None and drawing is not None:
         save(drawing.figure(), plot)
     if as_json:
         print(json.dumps(found.as_json()))
-    else:
+    elif not quiet:
         _print(found)
     if found.exit_code:
         raise typer.Exit(found.exit_code)
@@ -124,11 +126,15 @@ def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def _announce(changes: Sequence[Change]) -> None:
+def _nothing(text: str) -> None:
+    del text
+
+
+def _announce(changes: Sequence[Change], say: Callable[[str], None]) -> None:
     for change in changes:
-        print(f"note: {change}", file=sys.stderr)
+        say(f"note: {change}")
     if changes:
-        print("note: so equal bits are not promised; --rtol 1e-9 compares less strictly", file=sys.stderr)
+        say("note: so equal bits are not promised; --rtol 1e-9 compares less strictly")
 
 
 def _print(found: Replay) -> None:

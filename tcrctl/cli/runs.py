@@ -79,6 +79,7 @@ def runs(
         raise UnknownNameError("format", form, FORMATS)
     found = _found(out, which)
     _warn_of_unreadable(out)
+    _warn_of_unknown(out, which)
     if doing.remove:
         _remove(found, yes=doing.yes, as_json=as_json)
         return
@@ -102,6 +103,19 @@ def _warn_of_unreadable(out: Path) -> None:
     if left_out:
         said = ", ".join(left_out[:3]) + (f" and {len(left_out) - 3} more" if left_out[3:] else "")
         print(f"warning: left out, summary.json cannot be read: {said}", file=sys.stderr)
+
+
+def _warn_of_unknown(out: Path, which: Which) -> None:
+    """Say which names no run has: a misspelt one finds nothing, and sorts by nothing."""
+    from tcrctl.analysis.condition import parse_condition
+    from tcrctl.analysis.runs import find_runs
+
+    names = [] if which.where is None else [term.name for term in parse_condition(which.where).terms]
+    names += [] if which.sort is None else [which.sort.removeprefix("-")]
+    runs = find_runs(out)
+    for name in dict.fromkeys(names):
+        if runs and all(run.value(name) is None for run in runs):
+            print(f"warning: no run in {out} has a value named {name}", file=sys.stderr)
 
 
 def _found(out: Path, which: Which) -> list[FoundRun]:

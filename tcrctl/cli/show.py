@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -11,6 +11,11 @@ from tcrctl.cli.options import AsJson, IsRobot, Overrides, Spec
 
 if TYPE_CHECKING:
     from tcrctl.config.settings import Settings
+
+#: Lines are broken behind this column, as in all files that are written.
+_WIDEST: Final = 100
+#: Most entries of a line are shorter: ``start_frame_deg: 10.0, ``.
+_ENTRY: Final = 25
 
 
 def show(
@@ -40,7 +45,14 @@ def show(
         text = strict_yaml.read(shipped.find_robot(spec)).decode("utf-8-sig")
         print(with_values(text, found.model_dump(mode="json")), end="")
     else:
-        print(strict_yaml.dumps(found.model_dump(mode="json")), end="")
+        print(strict_yaml.dumps(found.model_dump(mode="json"), _columns()), end="")
+
+
+def _columns() -> int:
+    """Return the column behind which lines are broken, so that they fit into the terminal."""
+    from tcrctl.cli.layout import width
+
+    return min(_WIDEST, max((width() or _WIDEST + _ENTRY) - _ENTRY, _ENTRY))
 
 
 def _rig(name: str, overrides: Sequence[str] | None, *, robot: bool) -> Settings:

@@ -19,7 +19,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Final, TextIO
 
-from tcrctl.visible import visible
+from tcrctl.cli.layout import message, width
+from tcrctl.visible import unstyled, visible
 
 #: A message waits this long for a reader that is busy [s]. The control loop waits with it.
 PATIENCE_S: Final = 0.02
@@ -78,6 +79,8 @@ class Output(io.TextIOBase):
         """Write text, or drop it; characters that act on a terminal are spelt out, styles excepted."""
         if not isinstance(text, str):
             raise TypeError(f"a text stream takes str, not {type(text).__name__}")
+        if os.environ.get("NO_COLOR"):  # what libraries make of it still has weights
+            text = unstyled(text)
         keep = self.isatty() or bool(os.environ.get("FORCE_COLOR"))
         return self._take(visible(text, keep_styles=keep))
 
@@ -128,6 +131,15 @@ class Output(io.TextIOBase):
         return not self._blocked
 
 
+class Messages(Output):
+    """Text for people: on a terminal its lines break between words, not where the terminal ends."""
+
+    def write(self, text: str) -> int:
+        """Write a message, or drop it."""
+        super().write(message(text, width(self)) if self.isatty() else text)  # type: ignore[arg-type]
+        return len(text)
+
+
 class _Styled(io.TextIOBase):
     """Writes to an output as it is."""
 
@@ -162,7 +174,7 @@ def robust_streams() -> Iterator[Output]:
     """
     _fill_descriptors()
     before = sys.stdin, sys.stdout, sys.stderr
-    output, messages = Output(sys.stdout), Output(sys.stderr, PATIENCE_S)
+    output, messages = Output(sys.stdout), Messages(sys.stderr, PATIENCE_S)
     sys.stdin = before[0] if _is_open(before[0]) else io.StringIO()
     sys.stdout, sys.stderr = output, messages
     try:

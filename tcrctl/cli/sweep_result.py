@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tcrctl.cli.table import print_table
+from tcrctl.experiment.headline import count
 from tcrctl.report.study import write_study_page
 from tcrctl.study.groups import done
 from tcrctl.study.loading import LoadedStudy
@@ -66,7 +67,7 @@ def show(study: LoadedStudy, result: Done, found: Findings, out: Path, shape: Sh
 def _say_why(result: Done) -> str:
     """Say on stderr what the study lacks, if anything; return it."""
     if result.interruption is not None:
-        text = f"{result.interruption}; {result.missing} runs are missing: start again to go on"
+        text = f"{result.interruption}; {count(result.missing, 'run')} to go: start again to go on"
         print(f"error: {text}", file=sys.stderr)
         return str(result.interruption)
     if result.unanswered:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from tcrctl.cli.console import console
+from tcrctl.cli.console import console, has_styles
 from tcrctl.cli.layout import fact, laid_out, width
 from tcrctl.visible import visible
 
@@ -73,7 +73,8 @@ class _Screen:
     """Prints lines as they are, in a style where there are styles."""
 
     def __init__(self) -> None:
-        styled = sys.stdout.isatty() or bool(os.environ.get("FORCE_COLOR"))
+        forced = os.environ.get("FORCE_COLOR") and not os.environ.get("NO_COLOR")
+        styled = forced or has_styles(sys.stdout)
         self._console = console() if styled else None  # rich is slow to import
 
     def say(self, lines: Iterable[str], style: str, bold: int = 0) -> None:

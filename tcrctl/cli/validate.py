@@ -9,13 +9,14 @@ from typing import Annotated
 
 import typer
 
-from tcrctl.cli.options import AsJson, IsRobot, Overrides
+from tcrctl.cli.options import AsJson, IsRobot, Overrides, Quiet
 
 
 def validate(
     specs: Annotated[list[str], typer.Argument(metavar="SPEC...", help="Shipped names or YAML files.")],
     overrides: Overrides = None,
     robot: IsRobot = False,
+    quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
     """Check experiment, identification and study files without running them; exit code 2 if there is a problem.
@@ -32,7 +33,8 @@ def validate(
     valid: list[str] = []
     for name in specs:
         try:
-            for note in _load(name, overrides or (), robot=robot):
+            notes = _load(name, overrides or (), robot=robot)
+            for note in () if quiet else notes:
                 print(f"note: {note}", file=sys.stderr)
             valid.append(name)
         except SpecError as error:
@@ -40,7 +42,7 @@ def validate(
         except InputError as error:
             said = str(error).removeprefix(f"{name}: ")
             problems.append(Problem(name, "", f"{said}. {error.hint}" if error.hint else said))
-    if not as_json:
+    if not (as_json or quiet):
         for name in valid:
             print(f"{name}: ok")
     if problems:

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tcrctl.cli.layout import message, width
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.experiment.headline import count
 
 if TYPE_CHECKING:
     from tcrctl.workspace.workspace import Workspace
@@ -96,6 +98,6 @@ def _print(found: Workspace, folder: Path) -> None:
     for band in made["bands"]:
         numbers = f"{band['height_mm']:11.0f}  {band['radius_mm']:11.0f}  {band['tilt_deg']:10.0f}"
         print(f"{numbers}  {band['points']:6d}")
-    ends = ", ".join(f"{count} by {what}" for what, count in made["ray_ends"].items())
-    print(f"{made['points']} points; rays ended: {ends}")
+    ends = ", ".join(f"{number} by {what}" for what, number in made["ray_ends"].items())
+    print(message(f"{count(made['points'], 'point')}; rays ended: {ends}", width()))
     print(folder)

@@ -107,18 +107,26 @@ def _refuse_other_kinds(path: Path, wanted: str) -> None:
     """Raise an InputError that says what a file is, if it is something else than what is wanted."""
     from tcrctl.config import strict_yaml
 
-    content, shown = strict_yaml.read(path), shlex.quote(str(path))
-    if content.startswith(b"\x89MCAP"):
+    shown = shlex.quote(str(path))
+    if _begins(path, b"\x89MCAP"):  # before it is read: most logs are larger than such files may be
         hint = f"tcrctl run {shlex.quote(str(path.parent))} does the run again; tcrctl info {shown} shows the log."
         raise InputError(f"{path}: this is a log, not {wanted}", hint=hint)
     try:
-        keys = _keys_in(content)
+        keys = _keys_in(strict_yaml.read(path))
     except InputError:
         return  # whoever reads it says what is wrong
     found = {kind: use for section, (kind, use) in _SECTIONS.items() if section in keys}
     if found and wanted not in found:
         kind, use = next(iter(found.items()))
         raise InputError(f"{path}: this is {kind}, not {wanted}", hint=use.replace("{}", shown))
+
+
+def _begins(path: Path, mark: bytes) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.read(len(mark)) == mark
+    except OSError:  # whoever reads it says what is wrong
+        return False
 
 
 def find_identification(name_or_path: str) -> Path:
@@ -223,8 +231,8 @@ def _keys_in(content: bytes) -> dict[str, object]:
 
 
 def is_path(name_or_path: str) -> bool:
-    """Tell a path (has a separator or ends in .yaml, .yml) from a shipped name."""
-    return "/" in name_or_path or "\\" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
+    """Tell a path (has a separator, or a dot, as before .yaml) from a shipped name, which has neither."""
+    return any(mark in name_or_path for mark in ("/", "\\", "."))
 
 
 def _missing(path: Path) -> str:

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 from tcrctl.config.budget import MAX_PROBLEMS
 from tcrctl.config.keys import Finding, Keys
 from tcrctl.config.unions import Tagged, kind_of, models_in
+from tcrctl.config.units import same_in_another_unit
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -38,7 +39,7 @@ _TEMPLATES = {
     "literal_error": "must be {expected}",
     "too_short": "must have at least {min_length} entries, has {actual_length}",
     "too_long": "must have at most {max_length} entries, has {actual_length}",
-    "string_too_short": "must have at least {min_length} characters",
+    "string_too_short": "must have {min_length} or more characters",
     "string_too_long": "must have at most {max_length} characters",
     "string_pattern_mismatch": "must match the pattern {pattern}",
     "union_tag_invalid": "must be one of {expected_tags}",
@@ -118,7 +119,7 @@ def _shown(value: Any) -> str:
 
 
 def _closest(given: Any, allowed: list[str]) -> str:
-    close = difflib.get_close_matches(str(given)[:100], allowed, n=1)
+    close = difflib.get_close_matches(str(given)[:100], filter(None, allowed), n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
@@ -128,7 +129,9 @@ def _unknown_key(key: str, models: list[Tagged]) -> str:
         if section is not None:
             return f"belongs to {section}: write {_written_below(section, key, model)}"
     allowed = list(dict.fromkeys(name for model, _ in models for name in model.model_fields))
-    return f"unknown key{_closest(key, allowed)}; allowed: {', '.join(allowed)}"
+    known = [*allowed, *(name for model, _ in models for name in getattr(model, "moved", {}))]
+    hint = same_in_another_unit(key, known) or _closest(key, known)
+    return f"unknown key{hint}; allowed: {', '.join(allowed)}"
 
 
 def _written_below(section: str, key: str, model: type[BaseModel]) -> str:

@@ -241,13 +241,14 @@ def _finite(text: str) -> float:
     return number
 
 
-def dumps(data: Any) -> str:
+def dumps(data: Any, columns: int = 100) -> str:
     """Return data as YAML that ``strict_yaml.loads`` reads back unchanged.
 
     Args:
         data: Maps with text keys, lists, text, finite numbers, booleans and None.
+        columns: A line is broken behind the first entry that goes beyond.
     """
     text: str = yaml.dump(
-        data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100, default_flow_style=None
+        data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=columns, default_flow_style=None
     )
     return text

@@ -27,7 +27,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from tcr_hardware.emulators.motive import MotiveEmulator
-from tcr_hardware.emulators.plc_faults import FAULTS
+from tcr_hardware.emulators.plc_faults import wrong_argument
 from tcr_hardware.modbus.registers import Status
 from tcrctl.config import strict_yaml
 from tcrctl.config.keys import Finding, Keys
@@ -41,6 +41,7 @@ from tcrctl.emulate.camera_faults import (
     names_in,
     wrong_value,
 )
+from tcrctl.emulate.drive_faults import ARGUMENTS, Drives
 from tcrctl.emulate.line import EmulatedDrives
 
 #: A drive that moves faster than this between two looks is moving [um].
@@ -58,7 +59,7 @@ class Fault(Settings):
     cameras: dict[str, Any] | Literal["restart"] | None = Field(
         default=None, description=f"what is wrong with the cameras: restart, or {', '.join(CAMERA_FAULTS)}"
     )
-    plc: str | None = Field(default=None, description=f"what is wrong with the PLC: {', '.join(FAULTS)}")
+    plc: str | None = Field(default=None, description=f"what is wrong with the PLC: {', '.join(ARGUMENTS)}")
     with_: dict[str, float] = Field(default={}, alias="with", description="arguments of a fault of the PLC")
     robot: str | None = Field(default=None, description="whose PLC; null: all")
 
@@ -80,13 +81,21 @@ def _unknown(fault: Fault) -> Iterator[Finding]:
             yield ("cameras", name), f"there is no such fault; known: {', '.join(CAMERA_FAULTS)}"
         elif wrong := wrong_value(name, value):
             yield ("cameras", name), wrong
-    if fault.plc is not None and fault.plc not in FAULTS:
-        yield ("plc",), f"there is no fault {fault.plc}; known: {', '.join(FAULTS)}"
+    if fault.plc is not None and fault.plc not in ARGUMENTS:
+        yield ("plc",), f"there is no fault {fault.plc}; known: {', '.join(ARGUMENTS)}"
     elif fault.plc is not None:
-        for name in fault.with_:
-            if name not in FAULTS[fault.plc].arguments:
-                known = ", ".join(FAULTS[fault.plc].arguments) or "none"
-                yield ("with", name), f"{fault.plc} has no such argument; known: {known}"
+        yield from _wrong_arguments(fault.plc, fault.with_)
+    elif fault.with_:
+        yield ("with",), "cameras take no arguments besides their values"
+
+
+def _wrong_arguments(fault: str, given: Mapping[str, float]) -> Iterator[Finding]:
+    for name, value in given.items():
+        if name not in ARGUMENTS[fault]:
+            known = ", ".join(sorted(ARGUMENTS[fault])) or "none"
+            yield ("with", name), f"{fault} has no such argument; known: {known}"
+        elif wrong := wrong_argument(name, value):
+            yield ("with", name), wrong
 
 
 class FaultScript(Settings):
@@ -96,13 +105,13 @@ class FaultScript(Settings):
 
 
 def load_fault_script(
-    path: Path, robots: Collection[str] | None = None, markers: Collection[str] | None = None
+    path: Path, robots: Mapping[str, Drives] | None = None, markers: Collection[str] | None = None
 ) -> FaultScript:
     """Read a fault script.
 
     Args:
         path: The file.
-        robots: Robots that there are; None if any name may be given.
+        robots: Robots that there are, and their drives; None if any name may be given.
         markers: Markers that there are, by Motive's names; None if any name may be given.
 
     Raises:
@@ -120,11 +129,15 @@ def load_fault_script(
 
 
 def _strangers(
-    fault: Fault, at: Keys, robots: Collection[str] | None, markers: Collection[str] | None
+    fault: Fault, at: Keys, robots: Mapping[str, Drives] | None, markers: Collection[str] | None
 ) -> Iterator[Finding]:
-    """Return the names in a fault that nobody on the rig has."""
+    """Return what is named in a fault and nobody on the rig has."""
     if robots is not None and fault.robot is not None and fault.robot not in robots:
         yield (*at, "robot"), f"there is no robot {fault.robot} on the rig; there are {', '.join(robots)}"
+    for name, drives in (robots or {}).items():
+        if fault.plc is not None and fault.robot in (None, name):
+            found = drives.wrong(fault.plc, fault.with_)
+            yield from (((*at, *key), f"the drives of {name} {what}") for key, what in found)
     for key, value in fault.cameras.items() if isinstance(fault.cameras, dict) else ():
         known = known_names(key, markers or ())
         if markers is None or not known:

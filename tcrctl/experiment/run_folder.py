@@ -81,17 +81,35 @@ class RunFolder:
                 return
 
 
+def make_folder_for(path: Path) -> None:
+    """Make the folder that a file is to go to, if it is not there.
+
+    Raises:
+        DeviceError: If that cannot be.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise DeviceError(f"{path}: cannot be written: {path.parent} is a file, not a folder") from error
+    except OSError as error:
+        raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
 def replace_file(path: Path, text: str) -> None:
     """Write a file that is there whole or not at all, its folder too; two processes may write the same one.
+
+    A device stays what it is and is written to.
 
     Raises:
         DeviceError: If it cannot be written.
     """
-    beside = path.with_name(f"{path.name}.{os.getpid()}.part")
+    make_folder_for(path)
+    is_device = path.exists() and not path.is_file()
+    beside = path if is_device else path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         beside.write_text(text, encoding="utf-8")
-        os.replace(beside, path)
+        if not is_device:
+            os.replace(beside, path)
     except OSError as error:
         raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error
 

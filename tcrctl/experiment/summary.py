@@ -76,7 +76,9 @@ class Verdict:
 
     def __str__(self) -> str:
         value = "unknown" if self.value is None else f"{_shown(self.value, '.4g')} {self.unit}".rstrip()
-        return f"{self.name} is {value}, must be {self.relation} {_shown(self.limit, 'g')}"
+        return (
+            f"{self.name} is {value}, must be {self.relation} {_shown(self.limit, 'g')} {self.unit}".rstrip()
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -242,6 +242,6 @@ def table(deviations: Iterable[Deviation]) -> Iterator[tuple[str, ...]]:
     for item in deviations:
         unit = f" {item.unit}" if item.unit and not math.isnan(item.largest) else ""
         numbers = (
-            ("", "") if math.isnan(item.largest) else (f"{item.largest:.3g}{unit}", f"{item.rms:.3g}{unit}")
+            ("", "") if math.isnan(item.largest) else (f"{item.largest:.4g}{unit}", f"{item.rms:.4g}{unit}")
         )
         yield item.field, str(item.first_step), str(item.steps), *numbers

@@ -31,6 +31,7 @@ from typing import TYPE_CHECKING, Final
 
 from tcrctl.analysis.history import History
 from tcrctl.errors import DeviceError, InputError, UnknownNameError
+from tcrctl.experiment.run_folder import make_folder_for
 from tcrctl.plots.look import USUAL, Look
 
 if TYPE_CHECKING:
@@ -85,11 +86,12 @@ def save(figure: Figure, path: Path, look: Look = USUAL) -> None:
     Raises:
         DeviceError: If the file cannot be written.
     """
+    from tcrctl.plots.legends import at_peace
     from tcrctl.plots.style import printed
 
+    make_folder_for(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with printed(look):
+        with printed(look), at_peace(figure):
             figure.savefig(path, metadata=_METADATA.get(path.suffix))
     except OSError as error:
         raise DeviceError(f"{path}: cannot be written: {error.strerror or error}") from error

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from tcrctl.analysis.history import History
 from tcrctl.experiment.headline import number
 from tcrctl.plots import style
+from tcrctl.plots.legends import broken
 from tcrctl.signals import Array
 
 #: Width of a panel by its longest bar: behind that stands the number.
@@ -28,14 +29,24 @@ def draw(histories: Sequence[History]) -> Figure:
     if any(history.tracks_orientation for history in histories):
         angles = [np.degrees(history.orientation_error) for history in histories]
         measures.insert(1, ("orientation error [deg]", angles, _rms))
-    figure = style.new_figure(0.9 + 0.35 * len(histories))
-    panels = figure.subplots(1, len(measures), sharey=True, squeeze=False)[0]
+    figure, panels = _panels(len(measures), len(histories))
     for panel, (name, values, middle) in zip(panels, measures, strict=True):
         _draw(panel, values, middle)
         panel.set_xlabel(f"{name}\ndot: {'rms' if middle is _rms else 'median'}, end: max")
-    panels[0].set_yticks(range(len(histories)), [history.label for history in histories])
+    names = [history.label for history in histories]
+    panels[0].set_yticks(range(len(names)), [broken(name) if style.is_narrow() else name for name in names])
     panels[0].set_ylim(len(histories) - 0.4, -0.6)
     return figure
+
+
+def _panels(count: int, runs: int) -> tuple[Figure, list[Axes]]:
+    """Make a figure with panels beside each other, or below each other where there is no room."""
+    height = 0.9 + 0.35 * runs
+    if style.is_narrow():
+        figure = style.new_figure(count * height)
+        return figure, figure.subplots(count, 1, sharey=True, squeeze=False)[:, 0].tolist()
+    figure = style.new_figure(height)
+    return figure, figure.subplots(1, count, sharey=True, squeeze=False)[0].tolist()
 
 
 def _rms(values: Array) -> float:

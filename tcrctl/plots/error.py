@@ -12,6 +12,7 @@ from tcrctl.analysis.history import History
 from tcrctl.experiment.headline import numbers
 from tcrctl.experiment.spread import spread
 from tcrctl.plots import style
+from tcrctl.plots.legends import panel_legend
 from tcrctl.signals import Array
 
 #: Runs whose largest errors differ by more than this factor are drawn on a logarithmic axis.
@@ -40,7 +41,7 @@ def draw(histories: Sequence[History]) -> Figure:
     for panel in errors:
         _scale(panel)
     for panel in panels:
-        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3 if single else 1, borderaxespad=0.1)
+        panel_legend(panel, columns=3 if single else 1)
     style.span(panels, histories)
     return figure
 

@@ -17,6 +17,8 @@ STYLES: Final = {"paper": (9.0, 1.2), "talk": (14.0, 2.2)}
 #: Narrower figures than this have smaller text [mm], as in one column of a journal.
 _ONE_COLUMN: Final = 120.0
 _SMALLER: Final = 0.85
+#: Nor has a narrow one larger text than this for its width, whatever the style.
+_PT_PER_MM: Final = 0.12
 _MM_PER_INCH: Final = 25.4
 
 
@@ -41,7 +43,8 @@ class Look:
             InputError: If there is no such font.
         """
         size, line = STYLES[self.style]
-        size *= _SMALLER if self.width_mm < _ONE_COLUMN and self.style == "paper" else 1.0
+        if self.width_mm < _ONE_COLUMN:
+            size = max(_SMALLER * STYLES["paper"][0], min(_SMALLER * size, _PT_PER_MM * self.width_mm))
         return {
             "axes.labelsize": size,
             "axes.linewidth": 0.67 * line,

@@ -11,6 +11,7 @@ from tcrctl.analysis.history import History
 from tcrctl.experiment.headline import numbers
 from tcrctl.experiment.spread import spread
 from tcrctl.plots import style
+from tcrctl.plots.legends import panel_legend
 from tcrctl.signals import Array
 
 
@@ -30,4 +31,4 @@ def draw_values(panel: Axes, histories: Sequence[History], values: Sequence[Arra
         panel.plot(history.t[known], found[known], **style.line(i), label=f"{name}{said}")
     panel.set_ylim(bottom=0.0)
     style.span([panel], histories)
-    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1)
+    panel_legend(panel)

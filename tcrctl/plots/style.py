@@ -33,6 +33,8 @@ DASHES: Final[tuple[Any, ...]] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0,
 #: Width that heights and legends are made for [in].
 _USUAL_IN: Final = 7.0
 _USUAL_PT: Final = 9.0
+#: Two panels beside each other need so much with usual text [in].
+_TWO_PANELS_IN: Final = 4.0
 _STYLE: Final[Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": "#404040",
@@ -61,11 +63,17 @@ def printed(look: Look = USUAL) -> Iterator[None]:
 def new_figure(height_in: float) -> Figure:
     """Empty figure as wide as asked, taller for larger text; no window, no global state."""
     taller = max(1.0, mpl.rcParams["font.size"] / _USUAL_PT)
-    return Figure(figsize=(_width_in(), height_in * taller), layout="constrained")
+    return Figure(figsize=(width_in(), height_in * taller), layout="constrained")
 
 
-def _width_in() -> float:
+def width_in() -> float:
+    """Return the width that figures have now [in]."""
     return float(mpl.rcParams["figure.figsize"][0])
+
+
+def is_narrow() -> bool:
+    """Whether two panels beside each other would have no room for their legends."""
+    return bool(width_in() < _TWO_PANELS_IN * mpl.rcParams["font.size"] / _USUAL_PT)
 
 
 def time_panels(count: int, *, height_in: float = 1.5, columns: int = 1) -> tuple[Figure, list[Axes]]:
@@ -133,7 +141,7 @@ def legend(figure: Figure, panels: Sequence[Axes]) -> None:
         handles, names = panel.get_legend_handles_labels()
         found |= {name: handle for name, handle in zip(names, handles, strict=True) if name not in found}
     if found:
-        room = _width_in() / _USUAL_IN * _USUAL_PT / mpl.rcParams["font.size"]
+        room = width_in() / _USUAL_IN * _USUAL_PT / mpl.rcParams["font.size"]
         columns = max(1, min(len(found), int(room * (8 if max(map(len, found)) < 12 else 3))))
         figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=columns)
 

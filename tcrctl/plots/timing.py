@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +13,7 @@ from tcrctl.analysis.history import History
 from tcrctl.experiment.headline import numbers
 from tcrctl.experiment.spread import spread
 from tcrctl.plots import style
+from tcrctl.plots.legends import panel_legend
 from tcrctl.signals import Array
 
 _BINS: Final = 60
@@ -21,8 +22,7 @@ _BINS: Final = 60
 def draw(histories: Sequence[History]) -> Figure:
     """Draw the time of estimator and controller [ms], its distribution, and the lateness of paced runs."""
     paced = [history for history in histories if np.any(history.lateness > 0.0)]
-    figure = style.new_figure(2.9 + 1.9 * bool(paced))
-    rows = figure.subplots(1 + bool(paced), 2, width_ratios=(2.2, 1.0), squeeze=False)
+    figure, rows = _panels(1 + bool(paced))
     compute = [1e3 * history.compute for history in histories]
     _row(rows[0], histories, compute, "control time [ms]")
     period = 1e3 * float(np.median(histories[0].period))
@@ -32,6 +32,16 @@ def draw(histories: Sequence[History]) -> Figure:
     rows[-1][0].set_xlabel("t [s]")
     rows[-1][1].set_xlabel("steps")
     return figure
+
+
+def _panels(count: int) -> tuple[Figure, Any]:
+    """Make a figure with pairs of panels (count, 2), beside each other where there is room."""
+    height = 1.0 + 1.9 * count
+    if style.is_narrow():
+        figure = style.new_figure(1.8 * height)
+        return figure, figure.subplots(2 * count, 1).reshape(count, 2)
+    figure = style.new_figure(height)
+    return figure, figure.subplots(count, 2, width_ratios=(2.2, 1.0), squeeze=False)
 
 
 def _row(row: Sequence[Axes], histories: Sequence[History], values: Sequence[Array], name: str) -> None:
@@ -53,5 +63,5 @@ def _row(row: Sequence[Axes], histories: Sequence[History], values: Sequence[Arr
         )
     over_time.set(ylabel=name, ylim=(0.0, 1.08 * (top or 1.0)))
     style.span([over_time], histories)
-    over_time.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1)
+    panel_legend(over_time)
     often.set(ylim=over_time.get_ylim(), xscale="log")

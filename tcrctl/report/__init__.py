@@ -15,6 +15,7 @@ from pathlib import Path
 from tcrctl.analysis.history import read_histories
 from tcrctl.analysis.result import run_result
 from tcrctl.errors import DeviceError, InputError
+from tcrctl.experiment.run_folder import make_folder_for
 from tcrctl.report.numbers import payload
 from tcrctl.report.page import page
 
@@ -44,6 +45,7 @@ def write_report(
         raise InputError(f"{out}: exists already", hint="Give another name with -o, or --force.")
     results = [run_result(history.log) for history in histories]
     text = page(histories, results, payload(histories, results))
+    make_folder_for(out)
     try:
         with open(out, "w" if force else "x", encoding="utf-8") as stream:
             stream.write(text)

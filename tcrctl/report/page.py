@@ -59,7 +59,7 @@ def _heads(histories: Sequence[History], results: Sequence[Result]) -> dict[str,
         "title": escape(" | ".join(labels)),
         "name": f"{len(runs)} runs side by side",
         "subtitle": "<br>".join(escape(h.log.start.get("run_id", h.label)) for h in histories),
-        "reason": "".join(_reason(result, history) for history, result in runs),
+        "reason": "".join(_reason(result, history, history.label) for history, result in runs),
         "cards": "",
         "task": compared(labels, results)
         + "".join(f"<h3>{escape(h.label)}</h3>{text}" for h, r in runs if (text := task_table(r))),
@@ -84,8 +84,8 @@ def _subtitle(start: Mapping[str, str], history: History) -> str:
     return ", ".join([*parts, start.get("started", ""), truth])
 
 
-def _reason(result: Result, history: History) -> str:
-    """Write why a run did not succeed, with the way to its stop."""
+def _reason(result: Result, history: History, name: str = "") -> str:
+    """Write why a run did not succeed, with the way to its stop, and which run it was if there are several."""
     said = [escape(str(result.get("reason", "")))]
     if not history.log.complete:
         mend = f"The log is not complete; mend it with: tcrctl recover {shlex.quote(str(history.log.path))}"
@@ -93,4 +93,5 @@ def _reason(result: Result, history: History) -> str:
     text = ". ".join(part for part in said if part)
     stopped = result.get("status") not in FINISHED
     at = f"Stopped at {instant(float(history.t[-1]))}: " if text and stopped else ""
-    return f'<p class="reason">{at}{text}</p>' if text else ""
+    which = f"<b>{escape(name)}</b> " if name else ""
+    return f'<p class="reason">{which}{at}{text}</p>' if text else ""

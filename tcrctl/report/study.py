@@ -18,6 +18,7 @@ from typing import Final
 
 from tcrctl import __version__
 from tcrctl.config import strict_yaml
+from tcrctl.experiment.headline import count
 from tcrctl.experiment.run_folder import replace_file
 from tcrctl.report.strip import strip
 from tcrctl.study.groups import Run, done
@@ -62,7 +63,7 @@ def study_page(found: Findings, result: Done, folder: Path) -> str:
         description=escape(spec.description),
         status=escape(_status(result)),
         verdict="unclear" if result.missing else "bad" if result.unanswered else "good",
-        subtitle=escape(f"{len(runs)} runs; {spec.source}".rstrip("; ")),
+        subtitle=escape(f"{count(len(runs), 'run')}; {spec.source}".rstrip("; ")),
         groups=_table(groups),
         differences="".join(f"<section><h2>Pair by pair</h2>{_table(t)}</section>" for t in differences),
         strips="".join(_strips(spec, runs)),
@@ -75,7 +76,7 @@ def study_page(found: Findings, result: Done, folder: Path) -> str:
 
 def _status(result: Done) -> str:
     if result.missing:
-        return f"{result.missing} runs missing"
+        return f"{count(result.missing, 'run')} missing"
     return result.unanswered or "complete"
 
 

@@ -39,6 +39,8 @@ INNER_DEVIATION: Final = 1e-4
 COUNT: Final = 4
 #: The map is applied to a random deviation this often before the search begins, so that stiff parts have died out.
 SMOOTHING: Final = 3
+#: So many random deviations are tried: now and then rounding makes the search from one of them find nothing.
+STARTS: Final = 3
 
 Progress = Callable[[int, int], None]
 
@@ -172,10 +174,13 @@ def spectrum_of(step: StepMap) -> tuple[NDArray[np.complex128], bool]:
         StoppedError: If the plant's integrator did not converge, or a command is no number.
     """
     product = derivative(step, step.size, DEVIATION, central=True)
-    start = np.random.default_rng(0).standard_normal(step.size)
-    for _ in range(SMOOTHING if step.size > COUNT else 0):
-        start = product(start / np.linalg.norm(start))
-    found = largest_eigenvalues(product, start, COUNT)
+    for seed in range(STARTS):
+        start = np.random.default_rng(seed).standard_normal(step.size)
+        for _ in range(SMOOTHING if step.size > COUNT else 0):
+            start = product(start / np.linalg.norm(start))
+        found = largest_eigenvalues(product, start, COUNT)
+        if found.eigenvalues.size:
+            break
     return found.eigenvalues, found.converged
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.experiment.headline import count
 from tcrctl.signals import Array
 
 
@@ -84,8 +85,10 @@ class StabilityReport:
             return ""
         unstable = sum(point.radius >= 1.0 for point in self.points)
         unknown = sum(not np.isfinite(point.radius) for point in self.points)
-        parts = [f"spectral radius >= 1 at {unstable} of {len(self.points)} points"] if unstable else []
-        parts += [f"no eigenvalue found at {unknown} points"] if unknown else []
+        parts = (
+            [f"spectral radius >= 1 at {unstable} of {count(len(self.points), 'point')}"] if unstable else []
+        )
+        parts += [f"no eigenvalue found at {count(unknown, 'point')}"] if unknown else []
         return "; ".join(parts) or "the run was too short to be linearised"
 
     def frequency(self, point: StabilityPoint) -> float:

@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from tcrctl.errors import DeviceError
+from tcrctl.experiment.run_folder import make_folder_for
 from tcrctl.study.row import Row, loads
 
 ROWS: Final = "rows.jsonl"
@@ -40,8 +41,8 @@ class Store:
         Raises:
             DeviceError: If that cannot be, or another process writes here.
         """
+        make_folder_for(self._path)
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
             self._lock = os.open(self._lock_path, os.O_CREAT | os.O_RDWR, 0o644)
             _take(self._lock, self._path.parent)
             self._file = os.open(self._path, os.O_CREAT | os.O_RDWR | os.O_APPEND, 0o644)

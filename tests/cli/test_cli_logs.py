@@ -21,7 +21,7 @@ from tcrctl.analysis.result import run_result
 from tcrctl.cli.export import export
 from tcrctl.cli.info import info
 from tcrctl.cli.recover import recover
-from tcrctl.errors import InputError, LogError, TcrctlError
+from tcrctl.errors import DeviceError, InputError, TcrctlError
 from tcrctl.log.columns import COLUMNS, meanings
 from tcrctl.log.reader import read_log
 from tcrctl.signals import Timing
@@ -306,8 +306,8 @@ def test_export_replaces_a_file_only_when_forced(log, tmp_path):
     assert out.read_text() == "mine"
     assert tcrctl("export", log, "--csv", "-o", out, "--force")[0] == 0
     assert out.read_text() != "mine"
-    with pytest.raises(LogError):
-        export_log(log, "csv", tmp_path / "missing" / "out.csv")
+    with pytest.raises(DeviceError, match="a file, not a folder"):
+        export_log(log, "csv", out / "out.csv")
 
 
 @pytest.mark.parametrize("verb", [["info"], ["recover"], ["export", "--csv"]])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from types import SimpleNamespace
 
@@ -15,7 +16,10 @@ from support.log_files import open_log
 from support.studies import study_file
 from tcrctl.cli import paper
 from tcrctl.cli.app import main
-from tcrctl.cli.layout import fact, laid_out
+from tcrctl.cli.console import has_styles
+from tcrctl.cli.layout import fact, laid_out, message
+from tcrctl.cli.progress import SpokenProgress
+from tcrctl.cli.streams import Messages
 from tcrctl.paper.report import Line, make_line
 from tcrctl.paper.table import ROWS
 from tcrctl.study.address import program
@@ -61,6 +65,61 @@ def test_what_belongs_to_a_name_stays_beside_it(name, text, columns):
     lines = fact(name, text, 14, columns)
     assert words(lines) == [name, *text.split()]
     assert fits(lines, columns)
+
+
+def test_what_is_too_long_to_stand_beside_its_name_stands_below_it():
+    assert fact("source", "a" * 64, 20, 80) == ["source", "  " + "a" * 64]
+
+
+@given(st.lists(CELLS, min_size=1, max_size=4), st.integers(20, 100))
+def test_a_message_breaks_between_words_and_keeps_its_lines(lines, columns):
+    text = "".join(f"{line}\n" for line in lines)
+    told = message(text, columns)
+    assert words(told.splitlines()) == words(text.splitlines())
+    assert fits(told.splitlines(), columns)
+    assert message(text, None) == text
+
+
+class Terminal(io.StringIO):
+    """A terminal that keeps what it was sent."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize(
+    ("variables", "styled"),
+    [({"TERM": "xterm"}, True), ({"TERM": "dumb"}, False), ({"TERM": "xterm", "NO_COLOR": "1"}, False)],
+    ids=str,
+)
+def test_escape_codes_go_to_terminals_that_take_them(variables, styled, monkeypatch):
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert has_styles(Terminal()) == styled
+    assert not has_styles(io.StringIO())
+    terminal = Terminal()
+    print("\x1b[1mbold\x1b[0m", file=Messages(terminal), flush=True)
+    assert ("\x1b" in terminal.getvalue()) == ("NO_COLOR" not in variables)
+
+
+def test_a_message_on_a_narrow_terminal_is_broken_by_its_stream(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    terminal, pipe = Terminal(), io.StringIO()
+    for stream in (terminal, pipe):
+        print(f"error: {REASON}", file=Messages(stream), flush=True)
+    assert max(map(len, terminal.getvalue().splitlines())) <= 40
+    assert pipe.getvalue().count("\n") == 1
+
+
+def test_a_plain_terminal_is_told_ever_more_rarely_how_long_it_takes(capsys):
+    now = iter([0.0, *(0.5 * k for k in range(1, 65))])
+    progress = SpokenProgress(lambda: next(now))
+    for k in range(1, 65):
+        progress.say("letter_t", k, 64)
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split(":")[1].split()[0] for line in lines] == ["4", "8", "16", "32", "64"]
+    assert lines[1] == "letter_t: 8 of 64, 28 s left"
 
 
 @pytest.fixture(scope="module")

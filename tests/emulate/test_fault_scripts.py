@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from tcr_hardware.emulators.motive import MotiveEmulator, MotiveSettings
 from tcr_hardware.emulators.plc import PlcEmulator
 from tcr_hardware.emulators.plc_faults import FAULTS
+from tcrctl.emulate.drive_faults import ARGUMENTS, Drives, drives_of
 from tcrctl.emulate.fault_script import CAMERA_FAULTS, FaultPlayer, load_fault_script
 from tcrctl.errors import SpecError
+from tcrctl.plant.rig.file import read_rig
 
 
 def script(tmp_path, *lines, **names):
@@ -35,6 +39,20 @@ WRONG = {
     "before the start": ("{at_s: -1, plc: estop}", "must be >= 0"),
     "more than all frames": ("{at_s: 1, cameras: {loss: 3}}", "must be a share of the frames, 0 to 1, not 3"),
     "earlier than now": ("{at_s: 1, cameras: {delay_s: -0.1}}", "must be >= 0, not -0.1"),
+    "no exception code": (
+        "{at_s: 1, plc: exception, with: {code: 0}}",
+        "must be a whole number from 1 to 255",
+    ),
+    "half an axis": (
+        "{at_s: 1, plc: jam, with: {axis: 1.5}}",
+        "must be a whole number from 1 to 252, not 1.5",
+    ),
+    "no count": ("{at_s: 1, plc: silence, with: {count: -1}}", "must be a whole number from 1"),
+    "late by a negative time": (
+        "{at_s: 1, plc: delay, with: {seconds: -1}}",
+        "must be a number from 0 to 3600",
+    ),
+    "arguments of cameras": ("{at_s: 1, cameras: restart, with: {axis: 1}}", "cameras take no arguments"),
     "unknown event": ("{at_s: 1, after: lunch, plc: estop}", "after"),
 }
 
@@ -71,13 +89,37 @@ RIGHT = {
 @pytest.mark.parametrize("name", STRANGERS)
 def test_a_robot_or_marker_that_is_not_on_the_rig_is_found_before_anything_starts(name, tmp_path):
     line, message = STRANGERS[name]
-    known = {"robots": ["tcr600", "tcr700"], "markers": ["a.1", "a.2"]}
+    known = {
+        "robots": dict.fromkeys(("tcr600", "tcr700"), Drives({"estop": ()}, (1,))),
+        "markers": ["a.1", "a.2"],
+    }
     with pytest.raises(SpecError) as caught:
         script(tmp_path, line, **known)
     assert message in str(caught.value)
     for strange, right in RIGHT.items():
         line = line.replace(strange, right)
     script(tmp_path, line, **known)
+
+
+OF_DRIVES = {
+    "loopback: {plc: jam, with: {axis: 4}, robot: tcr600}": "drives of tcr600 have no axis 4; they have 1, 2, 3",
+    "loopback: {plc: drive, with: {axis: 1}}": "the drives of tcr600 have a fault drive that takes no arguments",
+    "dynamixel_loopback: {plc: estop}": "the drives of tcr600 have no fault estop; they have silence, corrupt",
+    "dynamixel_loopback: {plc: jam, with: {axis: 7}, robot: tcr700}": "have no axis 7; they have 1, 2, 3, 4, 5, 6",
+    "dynamixel_loopback: {plc: exception, with: {code: 4}}": "have no fault exception",
+}
+
+
+@pytest.mark.parametrize("line", OF_DRIVES)
+def test_what_the_drives_of_a_robot_do_not_have_is_found_before_anything_starts(line, tmp_path):
+    rig, _, fault = line.partition(": ")
+    robots = drives_of(read_rig(rig)[0])
+    with pytest.raises(SpecError) as caught:
+        script(tmp_path, fault.replace("{", "{at_s: 1, ", 1), robots=robots)
+    assert OF_DRIVES[line] in str(caught.value)
+    script(tmp_path, "{at_s: 1, plc: jam, with: {axis: 3}}", robots=robots)
+    motors = [] if rig == "loopback" else ["{at_s: 2, plc: drive, with: {axis: 2}}"]
+    script(tmp_path, "{at_s: 1, plc: delay, with: {seconds: 0.2}}", *motors, robots=robots)
 
 
 @pytest.fixture
@@ -140,6 +182,12 @@ def test_every_fault_of_the_emulators_can_be_asked_for(tmp_path):
     lines = [f"{{at_s: 0, cameras: {{{name}: {value}}}}}" for name, value in given.items()]
     lines += [f"{{at_s: 0, plc: {name}}}" for name in FAULTS]
     assert len(script(tmp_path, *lines).faults) == len(CAMERA_FAULTS) + len(FAULTS)
+
+
+def test_the_document_of_the_bench_names_every_fault_and_argument():
+    text = (Path(__file__).parents[2] / "docs" / "bench.md").read_text()
+    names = [*CAMERA_FAULTS, *ARGUMENTS, *(name for taken in ARGUMENTS.values() for name in taken)]
+    assert [name for name in names if f"`{name}`" not in text and f"{name}: " not in text] == []
 
 
 def test_cameras_change_names_and_version_and_change_them_back(tmp_path, bench):

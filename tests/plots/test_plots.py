@@ -25,8 +25,9 @@ from tcrctl.experiment.run import log_geometry
 from tcrctl.experiment.spec import load_spec
 from tcrctl.log.drawing import Ball, Drawing
 from tcrctl.numerics.rotation import angle_between, angles_from_normal
-from tcrctl.plots import FIGURES, draw, plan, save
+from tcrctl.plots import FIGURES, draw, plan, save, worth_drawing
 from tcrctl.plots.look import Look
+from tcrctl.plots.style import printed
 from tcrctl.robot.robot import Robot
 
 pytestmark = pytest.mark.slow
@@ -345,6 +346,25 @@ def test_a_figure_is_as_wide_as_asked(several, folder, width_mm, style):
         save(draw(name, several, look), path, look)
         with Image.open(path) as image:
             assert image.width == pytest.approx(width_mm / 25.4 * 200, abs=1.5)
+
+
+@pytest.mark.parametrize("style", ["paper", "talk"])
+@pytest.mark.parametrize("width_mm", [40.0, 60.0, 88.0, 120.0, 180.0])
+def test_every_figure_is_laid_out_at_every_width(pose, several, width_mm, style):
+    look = Look(width_mm=width_mm, style=style)
+    for histories in (pose, several):
+        for name in worth_drawing(histories):
+            with printed(look):
+                draw(name, histories, look).draw_without_rendering()  # a warning is an error here
+
+
+def test_a_figure_without_room_for_its_names_is_saved_without_a_word(several, tmp_path, recwarn):
+    look = Look(width_mm=40.0)
+    labelled = [dataclasses.replace(several[0], label=f"a run with a very long name {i}") for i in range(12)]
+    for name in ("error", "comparison", "drives"):
+        save(draw(name, labelled, look), tmp_path / f"{name}.png", look)
+        assert (tmp_path / f"{name}.png").stat().st_size > 2000
+    assert not recwarn.list
 
 
 def test_a_look_that_there_is_not_is_an_error(tmp_path, capsys):

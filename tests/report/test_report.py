@@ -166,6 +166,13 @@ def test_the_shapes_are_those_of_the_log_within_a_hundredth_of_a_millimetre(page
     assert robot["tip"] == 11
 
 
+def test_of_several_runs_it_is_said_which_was_stopped(tmp_path):
+    stop = {"status": "aborted", "reason": "safety stop"}
+    logs = [write(tmp_path / f"{name}.mcap", stop=stop) for name in ("one", "other")]
+    text = write_report(logs, tmp_path / "both.html", labels=["one & all", "other"]).read_text()
+    assert re.findall(r'<p class="reason"><b>(.+?)</b> ', text) == ["one &amp; all", "other"]
+
+
 def test_thinning_out_keeps_every_peak_and_mark():
     rng = np.random.default_rng(0)
     n = 5 * packing.MOST_POINTS + 123
@@ -240,7 +247,9 @@ def test_the_command_names_the_file_and_never_replaces_one_unasked(tmp_path, cap
         "file": str(tmp_path / "report.html"),
         "bytes": (tmp_path / "report.html").stat().st_size,
     }
-    assert main(["report", str(log), "-o", str(tmp_path / "no" / "a.html")]) == 5
+    assert main(["report", str(log), "-o", str(tmp_path / "new" / "a.html")]) == 0
+    assert (tmp_path / "new" / "a.html").is_file()
+    assert main(["report", str(log), "-o", str(log / "a.html")]) == 5
 
 
 def chromium(page, *options, hash_="", size=(1300, 1500)):

@@ -25,10 +25,12 @@ from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.settings import ExactSettings, PassiveObserverSettings
 from tcrctl.loop.loop import Parts
 from tcrctl.memory import Kept
+from tcrctl.numerics.spectrum import Spectrum
 from tcrctl.plant.settings import Mismatch, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.signals import Command
+from tcrctl.stability import analysis
 from tcrctl.stability.analysis import analysed_steps, inner_radius, linearisable, spectrum_of
 from tcrctl.stability.closed_loop import ClosedLoop, StepMap
 from tcrctl.stability.report import StabilityPoint, StabilityReport
@@ -259,6 +261,22 @@ def report(*radii, stopped=""):
         for i, r in enumerate(radii)
     )
     return StabilityReport("an experiment", "a robot", "ioc", 0.05, 10, "Newton", points, stopped)
+
+
+@pytest.mark.parametrize("in_vain", [0, 1, 5])
+def test_a_search_that_finds_nothing_begins_elsewhere(in_vain, monkeypatch):
+    starts = []
+
+    def search(product, start, count):
+        starts.append(tuple(start))
+        found = np.array([0.9 + 0.0j] * (len(starts) > in_vain))
+        return Spectrum(found, 1, found.size > 0)
+
+    monkeypatch.setattr(analysis, "derivative", lambda *_, **__: lambda w: w)
+    monkeypatch.setattr(analysis, "largest_eigenvalues", search)
+    found, converged = spectrum_of(SimpleNamespace(size=9))
+    assert converged == (found.size > 0) == (in_vain < analysis.STARTS)
+    assert len(set(starts)) == len(starts) == min(in_vain + 1, analysis.STARTS)
 
 
 def test_the_verdict_follows_the_largest_radius():

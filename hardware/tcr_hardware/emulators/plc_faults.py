@@ -55,6 +55,27 @@ FAULTS: Mapping[str, FaultKind] = MappingProxyType(
 )
 
 
+#: What an argument may be: lowest and highest value, and whether it is a whole number.
+ARGUMENTS: Mapping[str, tuple[float, float, bool]] = MappingProxyType(
+    {
+        "axis": (1, 252, True),
+        "code": (1, 255, True),
+        "count": (1, 10**9, True),
+        "function": (1, 127, True),
+        "keep": (0, 1, True),
+        "seconds": (0, 3600, False),
+    }
+)
+
+
+def wrong_argument(name: str, value: float) -> str:
+    """Say what is wrong with the value of an argument; empty if nothing is."""
+    low, high, whole = ARGUMENTS[name]
+    if low <= value <= high and (not whole or value == int(value)):
+        return ""
+    return f"must be a {'whole ' if whole else ''}number from {low:g} to {high:g}, not {value:g}"
+
+
 class UnknownFaultError(HardwareError):
     """A fault or argument that does not exist was asked for.
 

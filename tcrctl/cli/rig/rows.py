@@ -37,10 +37,10 @@ def _text(item: Any) -> str:
 
 def print_rows(title: str, rows: dict[str, str]) -> None:
     """Print a title and rows."""
-    print(title)
-    width = max(map(len, rows), default=0)
-    for name, text in rows.items():
-        print(f"  {name.ljust(width)}  {text}")
+    from tcrctl.cli.table import print_facts
+
+    styles = {"trouble": "red"}
+    print_facts([(f"  {name}", text, styles.get(name, "")) for name, text in rows.items()], title)
 
 
 def print_findings(lines: list[tuple[str, Finding]]) -> None:
