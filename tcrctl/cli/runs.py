@@ -92,6 +92,8 @@ def runs(
         found = _found(out, which)
     if as_json:
         print(json.dumps({"status": "success", "runs": [_as_json(run) for run in found]}))
+    elif not found and form == "text":
+        print(f"no run in {out}" + ("" if which.where is None else f" with {which.where}"), file=sys.stderr)
     else:
         _print(found, columns.split(",") if columns else list(COLUMNS), form)
 

@@ -82,6 +82,15 @@ def test_tags_stay_with_the_run_and_can_be_asked_for(logs, capsys):
     assert listed(capsys, logs, "--where", "tag=best") == [1]
 
 
+def test_a_folder_without_runs_says_so(logs, capsys):
+    assert main(["runs", str(logs / "unfinished")]) == 0
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err == f"no run in {logs / 'unfinished'}\n"
+    assert main(["runs", str(logs), "--where", "seed>7"]) == 0
+    assert capsys.readouterr().err == f"no run in {logs} with seed>7\n"
+
+
 def test_nothing_is_removed_without_yes(logs, capsys):
     assert main(["runs", str(logs), "--where", "seed>0", "--rm"]) == 0
     printed = capsys.readouterr()
