@@ -33,7 +33,7 @@ from tcrctl.controller.rest_gain import RestGain, carry, gain_learning, no_gain,
 from tcrctl.controller.slip import Slip, follow_slip, no_slip
 from tcrctl.controller.tension_gap import TensionGap
 from tcrctl.memory import POSITION, SPEED, Kept
-from tcrctl.robot import linear, pose, response
+from tcrctl.robot import linear, pose, response, response_basis
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
 from tcrctl.robot.hole_drag import HoleDrag, drag_force, fill_hole_drag, no_drag, turn
@@ -76,23 +76,22 @@ class MultiStepMemory(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def _dragged(model: Model, ws: Workspace, memory: MultiStepMemory, turn: float) -> Array:
     """Return by what usual drag displaces the point that the robot vibrates about (n_free,) [m]."""
-    force, moved = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
+    moved = np.zeros(ws.r.shape[0])
     if turn > 0.0:
-        drag_force(model, memory.drag, memory.slip.v, memory.slip.speed, force)
-        linear.solve(ws, force, moved)
+        drag_force(model, memory.drag, memory.slip.v, memory.slip.speed, moved)
+        linear.solve_again(ws, moved)
     return moved
 
 
 @njit(cache=True, error_model="numpy")
 def _told(model: Model, ws: Workspace, memory: MultiStepMemory) -> Array:
     """Return the same for a robot that follows its drives at once (n_free,) [m]: no noise of cameras is in it."""
-    speed, force, moved = memory.slip.speed, np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
-    v = np.zeros(memory.v.shape[0])
-    for k in range(force.shape[0]):
+    speed, moved, v = memory.slip.speed, np.zeros(ws.r.shape[0]), np.zeros(memory.v.shape[0])
+    for k in range(moved.shape[0]):
         for c in range(speed.shape[0]):
             v[3 * FIXED + k] += memory.at.gain[k, c] * speed[c]
-    drag_force(model, memory.drag, v, speed, force)
-    linear.solve(ws, force, moved)
+    drag_force(model, memory.drag, v, speed, moved)
+    linear.solve_again(ws, moved)
     return moved
 
 
@@ -107,13 +106,13 @@ def _update_offset(
     tuning: Tuning,
 ) -> None:
     """Filter the displacement of the point that the robot vibrates about: δ + K^-1 (M (a + α v) - drag)."""
-    force, lag, v, period = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0]), now.v, tuning.period
-    for k in range(force.shape[0]):
+    lag, v, period = np.zeros(ws.r.shape[0]), now.v, tuning.period
+    for k in range(lag.shape[0]):
         i, row = k // SIZE, k % SIZE
         for b in range(SIZE):
             j = SIZE * (i + 1) + b
-            force[k] += model.mass[i, row, b] * ((v[j] - memory.v[j]) / period + model.damping * v[j])
-    linear.solve(ws, force, lag)
+            lag[k] += model.mass[i, row, b] * ((v[j] - memory.v[j]) / period + model.damping * v[j])
+    linear.solve_again(ws, lag)
     learns = tuning.gain.doubt > 0.0 and not tuning.rests
     if learns:
         carry(memory.learnt, tuning.gain, now.drive + now.behind, memory.offset, tip)
@@ -124,13 +123,13 @@ def _update_offset(
         learn(memory.share, tuning.learning, end, _end(np.zeros(v.shape[0]), told, tip))
     else:
         forget(memory.share, tuning.learning)
-    for k in range(force.shape[0]):
+    for k in range(lag.shape[0]):
         lag[k] = deviation[3 * FIXED + k] + lag[k] - memory.share.share[0] * dragged[k]
     if learns:
         tell(memory.learnt, tuning.gain, lag, memory.offset, tip)
     else:
         rest(memory.learnt, tuning.gain, now.drive + now.behind, tuning.blend)
-        for k in range(force.shape[0]):
+        for k in range(lag.shape[0]):
             memory.offset[3 * FIXED + k] += tuning.blend * (lag[k] - memory.offset[3 * FIXED + k])
 
 
@@ -172,6 +171,8 @@ def forecast(
     """
     at, q, v = memory.at, now.q, now.v
     outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
+    if not outcome.converged:
+        linear.couple(ws, ws.r)  # which is done where the model has been followed
     deviation = np.empty(q.shape[0])
     away = np.empty(q.shape[0])
     finite = True
@@ -215,7 +216,7 @@ class MultiStep:
         at, still = rest_map(robot), np.zeros_like(robot.rest.q)
         q, drive = robot.rest.q.copy(), np.zeros(robot.n_cables)
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
-        basis = response.start_basis(robot.model, self._work, settings.modes)
+        basis = response_basis.start_basis(robot.model, self._work, settings.modes)
         self._memory = MultiStepMemory(
             at,
             still,
