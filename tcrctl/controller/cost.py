@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from tcrctl.controller.ioc import Weights
 from tcrctl.controller.settings import IocSettings, KinematicSettings, speed_limit
@@ -61,13 +62,20 @@ def input_limits(
         blocks: Number of input blocks.
         reserve: What of the speed limit is kept for something else [m/s].
     """
-    limit = speed_limit(settings) - reserve
-    low = np.full(blocks * drive.shape[0], -limit)
-    high = np.full(blocks * drive.shape[0], limit)
+    limit, (low, high) = speed_limit(settings) - reserve, robot.stroke
+    return _limits(drive, limit, low, high, settings.period_s, blocks)
+
+
+@njit(cache=True, error_model="numpy")
+def _limits(
+    drive: Array, limit: float, shortest: float, longest: float, period: float, blocks: int
+) -> tuple[Array, Array]:
+    """Return the limits of :func:`input_limits` for a speed [m/s], a stroke [m] and a period [s]."""
     m = drive.shape[0]
-    # a drive outside its stroke may still move back: limits never cross
-    low[:m] = np.minimum(np.maximum((robot.stroke[0] - drive) / settings.period_s, -limit), limit)
-    high[:m] = np.maximum(np.minimum((robot.stroke[1] - drive) / settings.period_s, limit), -limit)
+    low, high = np.full(blocks * m, -limit), np.full(blocks * m, limit)
+    for c in range(m):  # a drive outside its stroke may still move back: limits never cross
+        low[c] = np.minimum(np.maximum((shortest - drive[c]) / period, -limit), limit)
+        high[c] = np.maximum(np.minimum((longest - drive[c]) / period, limit), -limit)
     return low, high
 
 
@@ -79,9 +87,16 @@ def pose_error(reference: Reference, position: Array, normal: Array) -> Array:
 
 def outputs(estimate: Estimate, age: float, robot: Robot) -> Array:
     """Return outputs now (7 + m,): end position, normal, twist, tensions, moved on by ``age`` [s] with v."""
-    first = 3 * robot.tip
-    moved = age * (pose.output_matrix(estimate.q, robot.tip) @ estimate.v[first : first + 9])
-    twist = pose.twist(estimate.q, robot.tip)
-    now = np.concatenate([estimate.position, estimate.normal, [twist], estimate.tension])
-    now[:POSE_ROWS] += moved
+    now = np.empty(POSE_ROWS + estimate.tension.shape[0])
+    now[:3], now[3:6], now[POSE_ROWS:] = estimate.position, estimate.normal, estimate.tension
+    _move_on(estimate.q, estimate.v, age, robot.tip, now)
     return now
+
+
+@njit(cache=True, error_model="numpy")
+def _move_on(q: Array, v: Array, age: float, tip: int, now: Array) -> None:
+    """Fill in the twist, and move the end pose in ``now`` (7 + m,) on by ``age`` [s]."""
+    now[6] = pose.twist(q, tip)
+    rate = np.dot(pose.output_matrix(q, tip), v[3 * tip : 3 * tip + 9])
+    for i in range(POSE_ROWS):
+        now[i] += age * rate[i]

@@ -6,6 +6,7 @@ estimate -> predictor -> affine prediction -------+-> build_ioc -> solve_ioc -> 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -37,7 +38,7 @@ PREDICTORS: Final[Mapping[tuple[str, str], Callable[[Any, float, Robot, float], 
 LCP_TOLERANCE: Final = 1e-6
 
 #: Stands for the solution of a problem that was not even built.
-NO_SOLUTION: Final = Solution(np.zeros(0), np.inf, 0, False, 0)
+NO_SOLUTION: Final = Solution(np.zeros(0), np.inf, 0, False, 0, np.zeros((0, 0)))
 
 
 class InstantaneousOptimalControl:
@@ -86,15 +87,16 @@ class InstantaneousOptimalControl:
                 reason = f"the complementarity problem was not solved (residual {solution.residual:.2g})"
         if reason:  # from standstill the speed that the reference needs is a free change
             self._needed = np.zeros(self._m)
+        outputs = solution.outputs if solution.solved else forecast.prediction.free
         return Plan(
             speed=solution.inputs[: self._m],
-            tension=_last_tension(forecast, solution),
+            tension=outputs[-1, POSE_ROWS:].copy(),
             iterations=forecast.iterations,
             residual=forecast.residual,
             lcp_residual=solution.residual,
             lcp_pivots=solution.pivots,
             reason=reason,
-            expected=None if reason else self._expected(at.outputs[:3], forecast, solution),
+            expected=None if reason else self._expected(at.outputs[:3], solution),
         )
 
     def _cautious(self, awake: float) -> Weights:
@@ -102,11 +104,9 @@ class InstantaneousOptimalControl:
         calm = self._weights.speed_change
         return self._weights._replace(speed_change=calm + awake**2 * (self._shaken - calm))
 
-    def _expected(self, now: Array, forecast: Forecast, solution: Solution) -> Array:
+    def _expected(self, now: Array, solution: Solution) -> Array:
         """Return the end position (3,) [m] one period from now, between now and the first instant."""
-        free, gain = forecast.prediction
-        first = free[0, :3] + gain[0, :3] @ solution.inputs
-        expected: Array = now + (first - now) * (self._settings.period_s / self.ahead[0])
+        expected: Array = now + (solution.outputs[0, :3] - now) * (self._settings.period_s / self.ahead[0])
         return expected
 
     def _free_changes(self, forecast: Forecast, reference: Reference, previous: Array) -> Array:
@@ -125,15 +125,12 @@ def _doubt(forecast: Forecast) -> str:
     """Return why no command can be built on a forecast; empty if one can."""
     if not forecast.converged:
         return forecast.reason
-    if not (np.isfinite(forecast.prediction.free).all() and np.isfinite(forecast.prediction.gain).all()):
+    if not (_finite(forecast.prediction.free) and _finite(forecast.prediction.gain)):
         return "the prediction is not finite"
     return ""
 
 
-def _last_tension(forecast: Forecast, solution: Solution) -> Array:
-    """Return the tensions at the end of the horizon (m,) [N]; those without any input if there is none."""
-    free, gain = forecast.prediction
-    if not solution.solved:
-        return free[-1, POSE_ROWS:].copy()
-    predicted: Array = free[-1, POSE_ROWS:] + gain[-1, POSE_ROWS:] @ solution.inputs
-    return predicted
+def _finite(values: Array) -> bool:
+    """Return whether all values are finite, a fifth as long as one by one: else their square is not."""
+    flat = values.ravel()
+    return math.isfinite(flat @ flat)

@@ -6,6 +6,7 @@ estimate -> doubt, speed and stroke limits ----------+-> planner -> plan -> limi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -78,7 +79,7 @@ class Shell:
         if not self.dither.runs:
             return self._speed
         low, high = input_limits(self._settings, self._robot, estimate.drive, 1)
-        return np.asarray(np.clip(self._speed + self.dither.speed(), low, high))
+        return np.asarray(np.minimum(np.maximum(self._speed + self.dither.speed(), low), high))
 
     def _situation(self, estimate: Estimate, reference: Reference) -> Situation:
         """Move the integral action on, and gather what the planner is told."""
@@ -139,6 +140,6 @@ def _doubt(estimate: Estimate) -> str:
     """Return why no command can be built on an estimate; empty if one can."""
     if not estimate.converged:
         return "the estimator's step did not converge"
-    if not np.isfinite(estimate.q).all():
+    if not math.isfinite(estimate.q.sum()):
         return "the estimate is not finite"
     return ""
