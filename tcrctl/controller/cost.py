@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from tcrctl.controller.feedforward import reference_poses
 from tcrctl.controller.ioc import Weights
 from tcrctl.controller.settings import IocSettings, KinematicSettings, speed_limit
 from tcrctl.robot import pose
@@ -40,13 +41,24 @@ def make_weights(settings: IocSettings, m: int, instants: int) -> Weights:
 
 def make_target(settings: IocSettings, reference: Reference, shift: Array, m: int) -> Array:
     """Return outputs wanted at the prediction instants (n, 7 + m), shifted by the integral action (6,)."""
-    n = reference.ahead_position.shape[0]
-    target = np.zeros((n, POSE_ROWS + m))
-    target[:, :3] = reference.ahead_position + shift[:3]
-    if reference.ahead_normal is not None:
-        target[:, 3:6] = reference.ahead_normal + shift[3:]
-    if settings.tension is not None:
-        target[:, POSE_ROWS:] = settings.tension.reference_n
+    target: Array = fill_target(reference_poses(reference), shift, wanted_tension(settings), m)
+    return target
+
+
+def wanted_tension(settings: IocSettings) -> float:
+    """Return the tension that cables should have [N]; 0 without any wish, which has no weight then."""
+    return 0.0 if settings.tension is None else float(settings.tension.reference_n)
+
+
+@njit(cache=True, error_model="numpy")
+def fill_target(poses: Array, shift: Array, tension: float, m: int) -> Array:
+    """Return the target of :func:`make_target` for poses now and at the instants (n + 1, 6), and a tension [N]."""
+    target = np.zeros((poses.shape[0] - 1, POSE_ROWS + m))
+    for i in range(target.shape[0]):
+        for a in range(6):
+            target[i, a] = poses[i + 1, a] + shift[a]
+        for c in range(m):
+            target[i, POSE_ROWS + c] = tension
     return target
 
 
@@ -81,8 +93,11 @@ def _limits(
 
 def pose_error(reference: Reference, position: Array, normal: Array) -> Array:
     """Return the wanted minus measured end pose (6,): position [m], normal (0 where it is not tracked)."""
-    turned = np.zeros(3) if reference.normal is None else reference.normal - normal
-    return np.concatenate([reference.position - position, turned])
+    error = np.zeros(6)
+    error[:3] = reference.position - position
+    if reference.normal is not None:
+        error[3:] = reference.normal - normal
+    return error
 
 
 def outputs(estimate: Estimate, age: float, robot: Robot) -> Array:

@@ -92,6 +92,11 @@ class Dither:
         return float(self._seen.sizes[0])
 
     @property
+    def sleeps(self) -> bool:
+        """Whether it moves no drive, and none has to come back."""
+        return bool(self._seen.sizes[0] == 0.0 and self._wave == 0.0) and not np.count_nonzero(self._place)
+
+    @property
     def thrown(self) -> float | None:
         """By how much more than without friction the probing wave has thrown the end [m]; None: not known."""
         return None if self._probe is None else self._probe.thrown
@@ -166,6 +171,10 @@ class Dither:
         """Take the end position (3,) [m] that is expected one period from now; None if nothing is."""
         self._expects = position is not None and math.isfinite(position.sum())
         self._seen.expected[:] = position if position is not None and self._expects else 0.0
+
+    def sleep(self) -> None:
+        """Move on by a period in which it sleeps."""
+        self._step += 1
 
     def speed(self) -> Array:
         """Move on by a period, and return what is added to the drive speeds in it (m,) [m/s]."""

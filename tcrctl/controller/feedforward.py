@@ -30,7 +30,7 @@ def needed_speeds(gain: Array, output: Array, poses: Array, edges: Array, spacin
 
     Args:
         gain: S, position and normal by the drives at rest (6, m).
-        output: Q for position [1/m2] and normal (6,).
+        output: Q for position [1/m2] and normal, and more that is not read (6 or more,).
         poses: Wanted position [m] and normal now and at the instants (n + 1, 6).
         edges: Instants at which the blocks begin, and the end (blocks + 1,).
         spacing: Time between instants [s].

@@ -86,7 +86,7 @@ class Solution(NamedTuple):
         residual: Largest violation of the LCP's conditions.
         pivots: Pivots of Lemke's algorithm, all rounds.
         solved: The LCP was solved and no tension row outside it is violated.
-        rows: Rows of the last LCP.
+        rows: Rows of the last LCP; 0 if there was none.
         outputs: Y at the prediction instants with these inputs (n, 7 + m); without any if it is not solved.
     """
 

@@ -101,12 +101,24 @@ def _update_offset(
     ws: Workspace,
     memory: MultiStepMemory,
     deviation: Array,
-    now: Now,
+    v: Array,
+    drive: Array,
     tip: int,
     tuning: Tuning,
 ) -> None:
-    """Filter the displacement of the point that the robot vibrates about: δ + K^-1 (M (a + α v) - drag)."""
-    lag, v, period = np.zeros(ws.r.shape[0]), now.v, tuning.period
+    """Filter the displacement of the point that the robot vibrates about: δ + K^-1 (M (a + α v) - drag).
+
+    Args:
+        model: Robot arrays.
+        ws: Workspace as ``statics.follow`` left it.
+        memory: Its offset and what is learnt are changed.
+        deviation: δ (3 n_nodes,) [m].
+        v: Node velocities (3 n_nodes,) [m/s].
+        drive: Drive lengths without dither (m,) [m].
+        tip: Row of the first node of the tip ring.
+        tuning: Filter.
+    """
+    lag, period = np.zeros(ws.r.shape[0]), tuning.period
     for k in range(lag.shape[0]):
         i, row = k // SIZE, k % SIZE
         for b in range(SIZE):
@@ -115,7 +127,7 @@ def _update_offset(
     linear.solve_again(ws, lag)
     learns = tuning.gain.doubt > 0.0 and not tuning.rests
     if learns:
-        carry(memory.learnt, tuning.gain, now.drive + now.behind, memory.offset, tip)
+        carry(memory.learnt, tuning.gain, drive, memory.offset, tip)
     dragged = _dragged(model, ws, memory, tuning.turn)
     if tuning.turn > 0.0:
         told = _told(model, ws, memory)
@@ -128,7 +140,7 @@ def _update_offset(
     if learns:
         tell(memory.learnt, tuning.gain, lag, memory.offset, tip)
     else:
-        rest(memory.learnt, tuning.gain, now.drive + now.behind, tuning.blend)
+        rest(memory.learnt, tuning.gain, drive, tuning.blend)
         for k in range(lag.shape[0]):
             memory.offset[3 * FIXED + k] += tuning.blend * (lag[k] - memory.offset[3 * FIXED + k])
 
@@ -153,7 +165,7 @@ def forecast(
     grid: Grid,
     tip: int,
     tuning: Tuning,
-) -> tuple[Outcome, bool, Array, Array]:
+) -> tuple[Outcome, bool, Array, Array, Array]:
     """Make one prediction as in the module's docstring, in one kernel.
 
     Args:
@@ -167,9 +179,10 @@ def forecast(
         tuning: Filter and tolerance.
 
     Returns:
-        Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m).
+        Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m), and
+        position and normal by the drives at rest (6, m).
     """
-    at, q, v = memory.at, now.q, now.v
+    at, q, v, behind = memory.at, now.q, now.v, now.arrived - now.place - now.drive
     outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
     if not outcome.converged:
         linear.couple(ws, ws.r)  # which is done where the model has been followed
@@ -177,13 +190,13 @@ def forecast(
     away = np.empty(q.shape[0])
     finite = True
     for k in range(q.shape[0]):
-        deviation[k] = q[k] - at.equilibrium[k]
+        deviation[k] = q[k] + now.age * v[k] - at.equilibrium[k]
         finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
     fill_hole_drag(model, at.equilibrium, ws, memory.friction, tuning.turn, memory.drag)
     if finite:
         follow_slip(memory.slip, now.speed, v, tuning.period, tuning.drives.lag, tuning.follow)
     if outcome.converged and tuning.blend > 0.0 and finite:
-        _update_offset(model, ws, memory, deviation, now, tip, tuning)
+        _update_offset(model, ws, memory, deviation, v, now.drive + behind, tip, tuning)
     for hole in range(memory.drag.coefficient.shape[0]):  # what is not learnt is not counted
         memory.drag.coefficient[hole] *= memory.share.share[0]
     for k in range(q.shape[0]):
@@ -194,9 +207,10 @@ def forecast(
     release = response.Release(away, v, memory.learnt.gain)
     drag = response.Drag(memory.drag, held, tuning.follow)
     change, stable = response.respond(model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis, drag)
-    with_lag(change, grid.ahead[0], tuning.drives, now.behind, now.queue)
+    with_lag(change, grid.ahead[0], tuning.drives, behind, now.set_point - now.arrived)
     free, gain = superpose(change, now.outputs, grid.edges)
-    return outcome, stable, free, gain
+    at_rest = pose.drive_gain(at.equilibrium, at.gain + memory.learnt.gain, tip)[:6]
+    return outcome, stable, free, gain, at_rest
 
 
 class MultiStep:
@@ -266,7 +280,7 @@ class MultiStep:
         )
         if self._fresh > 0:  # the robot rests: all of its deviation is offset, on the mean
             memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0 / self._fresh, turn=0.0, rests=True)
-        outcome, stable, free, gain = forecast(
+        outcome, stable, free, gain, at_rest = forecast(
             robot.model, self._load, self._work, memory, now, self.grid, robot.tip, tuning
         )
         if outcome.converged:
@@ -274,11 +288,8 @@ class MultiStep:
             self._fresh = self._fresh + 1 if self._fresh and at.settling else 0
         good, self._solved = outcome.converged and stable, outcome.converged
         reason = "" if good else "the model has no stable equilibrium at the present drives"
-        at_rest = None
-        if self._feedforward:
-            moved = memory.at.gain + memory.learnt.gain
-            at_rest = pose.drive_gain(memory.at.equilibrium, moved, robot.tip)[:6]
-        return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)
+        rest_gain = at_rest if self._feedforward else None
+        return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, rest_gain)
 
 
 def _friction(robot: Robot) -> Array:

@@ -64,13 +64,19 @@ def follow(lags: Lags, reached: Array, before: Array, now: Array) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def _judge(errors: Array, fade: float, found: Array, reported: Array) -> None:
-    """Let errors (n,) [m2] fade, and add those of places (n, m) against reported ones (m,) [m]."""
+def _best(
+    lags: Lags, errors: Array, fade: float, last: Array, reported: Array, before: Array, now: Array
+) -> float:
+    """Let errors (n,) [m2] fade, add those against a report (m,) [m]; return the lag of the least one [s]."""
+    found, best = follow(lags, last, before, now), 0
     for i in range(found.shape[0]):
         error = 0.0
         for c in range(found.shape[1]):
             error += (found[i, c] - reported[c]) ** 2
         errors[i] = fade * errors[i] + error
+        if errors[i] < errors[best]:
+            best = i
+    return float(lags.lag[best])
 
 
 class LagSearch:
@@ -89,6 +95,4 @@ class LagSearch:
 
     def observe(self, last: Array, reported: Array, before: Array, now: Array) -> None:
         """Compare two reports (m,) [m] with the set-points (m,) [m] that belonged to them."""
-        found = follow(self._candidates, last, before, now)
-        _judge(self._errors, self._fade, found, reported)
-        self.lag = float(CANDIDATES[np.argmin(self._errors)])
+        self.lag = _best(self._candidates, self._errors, self._fade, last, reported, before, now)

@@ -39,15 +39,8 @@ class Reduced(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def mass_columns(mass: Array, X: Array, out: Array) -> None:
     """Set out = M X for columns X (n_free, r)."""
-    for k in range(X.shape[0]):
-        i, a = k // SIZE, k % SIZE
-        for c in range(X.shape[1]):
-            out[k, c] = 0.0
-        for b in range(SIZE):
-            value = mass[i, a, b]
-            if value != 0.0:
-                for c in range(X.shape[1]):
-                    out[k, c] += value * X[SIZE * i + b, c]
+    for i in range(mass.shape[0]):
+        np.dot(mass[i], X[SIZE * i : SIZE * (i + 1)], out[SIZE * i : SIZE * (i + 1)])
 
 
 @njit(cache=True, error_model="numpy")
