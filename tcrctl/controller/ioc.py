@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tcrctl.numerics import block_banded
+from tcrctl.numerics import block_banded, block_solves
 from tcrctl.numerics.lcp import SOLVED, lcp_residuals, solve_lcp
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.signals import Array
@@ -199,6 +199,17 @@ def _inverse(H: Array) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
+def _free_minimum(program: QuadraticProgram) -> Array:
+    """Return the inputs without any limits -H^-1 g (U,); NaN if H is not positive definite."""
+    factor, U = program.H.copy(), -program.g
+    if not block_banded.factor_diagonal(factor):
+        U[:] = np.nan
+    block_solves.transposed_vector(factor, U)
+    block_solves.upper_vector(factor, U)
+    return U
+
+
+@njit(cache=True, error_model="numpy")
 def _inside(program: QuadraticProgram, U: Array) -> bool:
     """Return whether all inputs are within their limits."""
     inside = True
@@ -219,12 +230,12 @@ def solve_ioc(program: QuadraticProgram, prediction: Prediction, weights: Weight
     m, size = prediction.free.shape[1] - POSE_ROWS, program.g.shape[0]
     chosen = np.zeros((prediction.free.shape[0], 2 * m), dtype=np.bool_)
     pivots, rows, residual = 0, 2 * size, np.inf
-    inverse, U = _inverse(program.H), np.zeros(size)
-    free = -np.dot(inverse, program.g)
+    free = _free_minimum(program)
     if _inside(program, free):  # κ = 0 solves the LCP, and no input stands at a limit
         Y = _outputs(prediction, free)
         if _violated(Y, weights, chosen) == 0:
             return Solution(free, 0.0, 0, True, rows, Y)
+    inverse, U = _inverse(program.H), np.zeros(size)
     for _ in range(MAX_ROUNDS):
         A, b, D = _rows(program, prediction, weights, chosen)
         rows = b.shape[0]
