@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from tcrctl.controller.cost_arrays import fill_target, limits, move_on
 from tcrctl.controller.feedforward import reference_poses
 from tcrctl.controller.ioc import Weights
 from tcrctl.controller.settings import IocSettings, KinematicSettings, speed_limit
-from tcrctl.robot import pose
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Estimate, Reference
@@ -50,18 +49,6 @@ def wanted_tension(settings: IocSettings) -> float:
     return 0.0 if settings.tension is None else float(settings.tension.reference_n)
 
 
-@njit(cache=True, error_model="numpy")
-def fill_target(poses: Array, shift: Array, tension: float, m: int) -> Array:
-    """Return the target of :func:`make_target` for poses now and at the instants (n + 1, 6), and a tension [N]."""
-    target = np.zeros((poses.shape[0] - 1, POSE_ROWS + m))
-    for i in range(target.shape[0]):
-        for a in range(6):
-            target[i, a] = poses[i + 1, a] + shift[a]
-        for c in range(m):
-            target[i, POSE_ROWS + c] = tension
-    return target
-
-
 def input_limits(
     settings: IocSettings | KinematicSettings, robot: Robot, drive: Array, blocks: int, reserve: float = 0.0
 ) -> tuple[Array, Array]:
@@ -75,20 +62,7 @@ def input_limits(
         reserve: What of the speed limit is kept for something else [m/s].
     """
     limit, (low, high) = speed_limit(settings) - reserve, robot.stroke
-    return _limits(drive, limit, low, high, settings.period_s, blocks)
-
-
-@njit(cache=True, error_model="numpy")
-def _limits(
-    drive: Array, limit: float, shortest: float, longest: float, period: float, blocks: int
-) -> tuple[Array, Array]:
-    """Return the limits of :func:`input_limits` for a speed [m/s], a stroke [m] and a period [s]."""
-    m = drive.shape[0]
-    low, high = np.full(blocks * m, -limit), np.full(blocks * m, limit)
-    for c in range(m):  # a drive outside its stroke may still move back: limits never cross
-        low[c] = np.minimum(np.maximum((shortest - drive[c]) / period, -limit), limit)
-        high[c] = np.maximum(np.minimum((longest - drive[c]) / period, limit), -limit)
-    return low, high
+    return limits(drive, limit, low, high, settings.period_s, blocks)
 
 
 def pose_error(reference: Reference, position: Array, normal: Array) -> Array:
@@ -104,14 +78,5 @@ def outputs(estimate: Estimate, age: float, robot: Robot) -> Array:
     """Return outputs now (7 + m,): end position, normal, twist, tensions, moved on by ``age`` [s] with v."""
     now = np.empty(POSE_ROWS + estimate.tension.shape[0])
     now[:3], now[3:6], now[POSE_ROWS:] = estimate.position, estimate.normal, estimate.tension
-    _move_on(estimate.q, estimate.v, age, robot.tip, now)
+    move_on(estimate.q, estimate.v, age, robot.tip, now)
     return now
-
-
-@njit(cache=True, error_model="numpy")
-def _move_on(q: Array, v: Array, age: float, tip: int, now: Array) -> None:
-    """Fill in the twist, and move the end pose in ``now`` (7 + m,) on by ``age`` [s]."""
-    now[6] = pose.twist(q, tip)
-    rate = np.dot(pose.output_matrix(q, tip), v[3 * tip : 3 * tip + 9])
-    for i in range(POSE_ROWS):
-        now[i] += age * rate[i]

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numba import njit
 
 from tcrctl.controller.settings import IntegralSettings
 from tcrctl.memory import NORMAL, POSITION, Kept
@@ -40,15 +39,10 @@ class IntegralAction:
 
         Saturated inputs cannot act on more shift (anti-windup), so it does not grow then.
         """
-        self.shift = _moved(self.shift, error, gain * self._rate, self._limit, saturated)
-        return self.shift
-
-
-@njit(cache=True, error_model="numpy")
-def _moved(shift: Array, error: Array, rate: float, limit: Array, saturated: bool) -> Array:
-    """Return the shift (6,) after one period; see :meth:`IntegralAction.update`."""
-    moved = np.empty(shift.shape[0])
-    for i in range(shift.shape[0]):
-        wanted = np.minimum(np.maximum(shift[i] + rate * error[i], -limit[i]), limit[i])
-        moved[i] = shift[i] if saturated and not abs(wanted) < abs(shift[i]) else wanted
-    return moved
+        wanted: Array = np.minimum(
+            np.maximum(self.shift + gain * self._rate * error, -self._limit), self._limit
+        )
+        if saturated:
+            wanted = np.where(np.abs(wanted) < np.abs(self.shift), wanted, self.shift)
+        self.shift = wanted
+        return wanted

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from tcrctl.controller.blocks import Grid
-from tcrctl.controller.cost import fill_target
+from tcrctl.controller.cost_arrays import fill_target
 from tcrctl.controller.feedforward import needed_speeds, wanted_changes
 from tcrctl.controller.ioc import Prediction, Solution, Weights, build_ioc, solve_ioc
 from tcrctl.signals import Array

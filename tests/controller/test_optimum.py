@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tcrctl.controller.blocks import make_grid
-from tcrctl.controller.cost import fill_target
+from tcrctl.controller.cost_arrays import fill_target
 from tcrctl.controller.feedforward import needed_speeds, wanted_changes
 from tcrctl.controller.ioc import Prediction, Weights, build_ioc, solve_ioc
 from tcrctl.controller.optimum import Demand, optimum
