@@ -63,10 +63,12 @@ def superpose(change: Array, now: Array, edges: Array) -> tuple[Array, Array]:
             free[i, r] = now[r] + change[i, r, m]
         for b in range(edges.shape[0] - 1):
             begun, ended = i - edges[b], i - edges[b + 1]
-            if begun >= 0:
+            if ended >= 0:
+                for r in range(rows):
+                    for c in range(m):
+                        gain[i, r, b * m + c] = change[begun, r, c] - change[ended, r, c]
+            elif begun >= 0:
                 for r in range(rows):
                     for c in range(m):
                         gain[i, r, b * m + c] = change[begun, r, c]
-                        if ended >= 0:
-                            gain[i, r, b * m + c] -= change[ended, r, c]
     return free, gain

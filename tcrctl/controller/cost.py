@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcrctl.controller.cost_arrays import fill_target, limits, move_on
+from tcrctl.controller.feedforward import reference_poses
 from tcrctl.controller.ioc import Weights
 from tcrctl.controller.settings import IocSettings, KinematicSettings, speed_limit
-from tcrctl.robot import pose
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Estimate, Reference
@@ -39,14 +40,13 @@ def make_weights(settings: IocSettings, m: int, instants: int) -> Weights:
 
 def make_target(settings: IocSettings, reference: Reference, shift: Array, m: int) -> Array:
     """Return outputs wanted at the prediction instants (n, 7 + m), shifted by the integral action (6,)."""
-    n = reference.ahead_position.shape[0]
-    target = np.zeros((n, POSE_ROWS + m))
-    target[:, :3] = reference.ahead_position + shift[:3]
-    if reference.ahead_normal is not None:
-        target[:, 3:6] = reference.ahead_normal + shift[3:]
-    if settings.tension is not None:
-        target[:, POSE_ROWS:] = settings.tension.reference_n
+    target: Array = fill_target(reference_poses(reference), shift, wanted_tension(settings), m)
     return target
+
+
+def wanted_tension(settings: IocSettings) -> float:
+    """Return the tension that cables should have [N]; 0 without any wish, which has no weight then."""
+    return 0.0 if settings.tension is None else float(settings.tension.reference_n)
 
 
 def input_limits(
@@ -61,27 +61,22 @@ def input_limits(
         blocks: Number of input blocks.
         reserve: What of the speed limit is kept for something else [m/s].
     """
-    limit = speed_limit(settings) - reserve
-    low = np.full(blocks * drive.shape[0], -limit)
-    high = np.full(blocks * drive.shape[0], limit)
-    m = drive.shape[0]
-    # a drive outside its stroke may still move back: limits never cross
-    low[:m] = np.minimum(np.maximum((robot.stroke[0] - drive) / settings.period_s, -limit), limit)
-    high[:m] = np.maximum(np.minimum((robot.stroke[1] - drive) / settings.period_s, limit), -limit)
-    return low, high
+    limit, (low, high) = speed_limit(settings) - reserve, robot.stroke
+    return limits(drive, limit, low, high, settings.period_s, blocks)
 
 
 def pose_error(reference: Reference, position: Array, normal: Array) -> Array:
     """Return the wanted minus measured end pose (6,): position [m], normal (0 where it is not tracked)."""
-    turned = np.zeros(3) if reference.normal is None else reference.normal - normal
-    return np.concatenate([reference.position - position, turned])
+    error = np.zeros(6)
+    error[:3] = reference.position - position
+    if reference.normal is not None:
+        error[3:] = reference.normal - normal
+    return error
 
 
 def outputs(estimate: Estimate, age: float, robot: Robot) -> Array:
     """Return outputs now (7 + m,): end position, normal, twist, tensions, moved on by ``age`` [s] with v."""
-    first = 3 * robot.tip
-    moved = age * (pose.output_matrix(estimate.q, robot.tip) @ estimate.v[first : first + 9])
-    twist = pose.twist(estimate.q, robot.tip)
-    now = np.concatenate([estimate.position, estimate.normal, [twist], estimate.tension])
-    now[:POSE_ROWS] += moved
+    now = np.empty(POSE_ROWS + estimate.tension.shape[0])
+    now[:3], now[3:6], now[POSE_ROWS:] = estimate.position, estimate.normal, estimate.tension
+    move_on(estimate.q, estimate.v, age, robot.tip, now)
     return now

@@ -16,13 +16,16 @@ the motion that was predicted: a wrong model misses by that, too. A robot withou
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from tcrctl.controller import surprise
 from tcrctl.controller.dither_settings import DitherSettings
 from tcrctl.controller.friction_probe import SHORTEST, FrictionProbe
+from tcrctl.controller.surprise import adapting, still_wave
 from tcrctl.memory import POSITION, Kept
 from tcrctl.robot.robot import Robot
 from tcrctl.robot.swing import signs
@@ -73,22 +76,25 @@ class Dither:
         room = self._settings.speed_part * limit * self._half_wave * period / 2.0
         self._most = min(self._settings.most_mm / 1e3, room)
         self._least = min(self._settings.least_mm / 1e3, self._most)
-        self._sizes = np.array([self._least if self.runs else 0.0, 0.0])
+        self._adapting = adapting(self._settings, period, self._least, self._most)
+        self._seen = still_wave(self._least if self.runs else 0.0, 2 * self._half_wave)
         self._probe: FrictionProbe | None = None
         told = self._half_wave >= SHORTEST and self._settings.probe_mm > 0.0
         if self.runs and told and self._settings.probe_mm > self._settings.least_mm:
             self._probe = FrictionProbe(robot, self._half_wave, period)
         self._probes = False
         self._wave, self._place = 0.0, np.zeros(robot.n_cables)
-        self._expects, self._expected = False, np.zeros(3)
-        self._position, self._motions = np.zeros(3), np.zeros((2 * self._half_wave, 3))
-        self._errors = np.zeros((2 * self._half_wave, 3))
-        self._blend = -float(np.expm1(-period / self._settings.filter_s))
+        self._expects = False
 
     @property
     def amplitude(self) -> float:
         """Half of the travel to and fro [m]."""
-        return float(self._sizes[0])
+        return float(self._seen.sizes[0])
+
+    @property
+    def sleeps(self) -> bool:
+        """Whether it moves no drive, and none has to come back."""
+        return bool(self._seen.sizes[0] == 0.0 and self._wave == 0.0) and not np.count_nonzero(self._place)
 
     @property
     def thrown(self) -> float | None:
@@ -114,12 +120,12 @@ class Dither:
     @property
     def innovation(self) -> float:
         """Filtered size of the innovation over a wave [m]."""
-        return float(self._sizes[1])
+        return float(self._seen.sizes[1])
 
     def stand_still(self) -> None:
         """Move no drive from now on: under a periodic input a loop has no equilibrium to linearise about."""
         self.runs = False
-        self._sizes[:] = 0.0
+        self._seen.sizes[:] = 0.0
         self._wave = 0.0
         self._place[:] = 0.0
 
@@ -130,14 +136,8 @@ class Dither:
         """
         if not self.runs:
             return {}
-        kept = {
-            "place": self._place,
-            "sizes": self._sizes,
-            "expected": self._expected,
-            "position": self._position,
-            "errors": self._errors.ravel(),  # a view
-            "motions": self._motions.ravel(),
-        }
+        seen = {name: values.ravel() for name, values in self._seen._asdict().items()}  # views
+        kept = {"place": self._place, **seen}
         return {f"dither_{name}": Kept(values, POSITION) for name, values in kept.items()}
 
     def observe(self, position: Array, estimate: Estimate, *, settling: bool = False) -> None:
@@ -154,42 +154,27 @@ class Dither:
             self._try(self._probe, estimate)
         elif self._probes:  # it is over
             self._probes = False
-            self._sizes[0] = self._most if self.rubs else self._least
-        elif np.isfinite(position).all():
-            self._surprise(position)
-            grown = self._sizes[0] + self._period * self._rate()
-            self._sizes[0] = min(max(grown, self._least), self._most)
-        self._position[:] = position
+            self._seen.sizes[0] = self._most if self.rubs else self._least
+        else:
+            slot, threshold = self._step % self._seen.errors.shape[0], self._settings.threshold_mm / 1e3
+            threshold *= CONVINCING if self.slides else 1.0
+            surprise.observe(self._seen, self._adapting, position, slot, self._expects, threshold)
+        self._seen.position[:] = position
 
     def _try(self, probe: FrictionProbe, estimate: Estimate) -> None:
         """Find out whether cables rub."""
         self._probes = True
-        self._sizes[0] = min(self._settings.probe_mm / 1e3, self._most)
+        self._seen.sizes[0] = min(self._settings.probe_mm / 1e3, self._most)
         probe.observe(estimate.position, estimate.drive)
-
-    def _rate(self) -> float:
-        """Return by how much the amplitude grows [m/s]."""
-        amplitude, innovation = self._sizes
-        excess = innovation - self._settings.threshold_mm / 1e3 * (CONVINCING if self.slides else 1.0)
-        return float(
-            self._settings.growth_1_s * excess if excess > 0.0 else -amplitude / self._settings.release_s
-        )
-
-    def _surprise(self, position: Array) -> None:
-        """Compare the end position (3,) [m] with the one expected a period before."""
-        if not self._expects:
-            return
-        s = self._settings
-        self._errors[self._step % self._errors.shape[0]] = position - self._expected
-        self._motions[self._step % self._motions.shape[0]] = self._expected - self._position
-        size = float(np.linalg.norm(np.mean(self._errors, axis=0)))
-        size = max(size - s.motion_part * float(np.linalg.norm(np.mean(self._motions, axis=0))), 0.0)
-        self._sizes[1] += self._blend * (min(size, s.outlier_mm / 1e3) - self._sizes[1])
 
     def expect(self, position: Array | None) -> None:
         """Take the end position (3,) [m] that is expected one period from now; None if nothing is."""
-        self._expects = position is not None and bool(np.isfinite(position).all())
-        self._expected[:] = position if position is not None and self._expects else 0.0
+        self._expects = position is not None and math.isfinite(position.sum())
+        self._seen.expected[:] = position if position is not None and self._expects else 0.0
+
+    def sleep(self) -> None:
+        """Move on by a period in which it sleeps."""
+        self._step += 1
 
     def speed(self) -> Array:
         """Move on by a period, and return what is added to the drive speeds in it (m,) [m/s]."""

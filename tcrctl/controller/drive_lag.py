@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from tcrctl.signals import Array
@@ -69,6 +70,8 @@ def with_lag(change: Array, step: float, drives: DriveLag, behind: Array, queue:
         behind: p (m,) [m].
         queue: w (m,) [m].
     """
+    if drives.lag == 0.0 and drives.dead_time == 0.0 and not np.any(behind):
+        return
     n_steps, rows, m = change.shape[0], change.shape[1], change.shape[2] - 1
     slow = change[:, :, :m].copy()
     if drives.lag > 0.0:

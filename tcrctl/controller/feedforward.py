@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from tcrctl.numerics import block_banded
 from tcrctl.signals import Array, Reference
 
 #: ε as a part of the mean diagonal of S'QS.
@@ -29,7 +30,7 @@ def needed_speeds(gain: Array, output: Array, poses: Array, edges: Array, spacin
 
     Args:
         gain: S, position and normal by the drives at rest (6, m).
-        output: Q for position [1/m2] and normal (6,).
+        output: Q for position [1/m2] and normal, and more that is not read (6 or more,).
         poses: Wanted position [m] and normal now and at the instants (n + 1, 6).
         edges: Instants at which the blocks begin, and the end (blocks + 1,).
         spacing: Time between instants [s].
@@ -48,7 +49,12 @@ def needed_speeds(gain: Array, output: Array, poses: Array, edges: Array, spacin
         time = spacing * (edges[b + 1] - edges[b])
         for r in range(6):
             moved[r, b] = (poses[int(edges[b + 1]), r] - poses[int(edges[b]), r]) / time
-    return np.linalg.solve(H, np.dot(weighted, moved)).T.copy()
+    needed = np.dot(weighted, moved)
+    block_banded.factor_diagonal(H)  # positive: the ridge sees to it
+    block_banded.solve_transposed(H, needed)
+    block_banded.solve_upper(H, needed)
+    speeds: Array = needed.T.copy()
+    return speeds
 
 
 @njit(cache=True, error_model="numpy")

@@ -44,6 +44,7 @@ class FrictionProbe:
     Attributes:
         pattern: How far each drive goes, the farthest by 1 (m,): the longest cables, as they move the end along x.
         frictionless: Y_0 [m/m].
+        thrown: e [m]; None as long as it is not known.
     """
 
     def __init__(self, robot: Robot, half_wave: int, period: float) -> None:
@@ -54,11 +55,7 @@ class FrictionProbe:
         self.frictionless = _frictionless(robot, self.pattern, half_wave, period)
         self._past: list[Array] = []
         self._thrown: list[float] = []
-
-    @property
-    def thrown(self) -> float | None:
-        """e [m]; None as long as it is not known."""
-        return float(np.mean(self._thrown)) if len(self._thrown) >= ENOUGH else None
+        self.thrown: float | None = None
 
     def observe(self, position: Array, drive: Array) -> None:
         """Take the end position (3,) [m] and the drives at the same time (m,) [m], step by step."""
@@ -72,6 +69,8 @@ class FrictionProbe:
         size = swing(seen, self._half)
         if np.isfinite(size).all() and size[0] > FAINT:
             self._thrown.append(float(np.linalg.norm(size[1:])) - self.frictionless * float(size[0]))
+            if len(self._thrown) >= ENOUGH:
+                self.thrown = float(np.mean(self._thrown))
 
 
 def swing(seen: Array, half: int) -> Array:

@@ -1,7 +1,7 @@
 """Instantaneous optimal control: predict, build (30), solve the LCP, refuse what is not solved.
 
 target = reference + integral shift --------------+
-estimate -> predictor -> affine prediction -------+-> build_ioc -> solve_ioc -> first block -> plan
+estimate -> predictor -> affine prediction -------+-> optimum (build_ioc -> solve_ioc) -> first block -> plan
 """
 
 from __future__ import annotations
@@ -11,20 +11,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from tcrctl.controller.cost import make_target, make_weights
-from tcrctl.controller.feedforward import needed_speeds, reference_poses, wanted_changes
+from tcrctl.controller.cost import make_weights, wanted_tension
+from tcrctl.controller.feedforward import reference_poses
 from tcrctl.controller.inner_map import InnerMap
-from tcrctl.controller.ioc import Solution, Weights, build_ioc, solve_ioc
+from tcrctl.controller.ioc import Solution, Weights
 from tcrctl.controller.multi_step import MultiStep
 from tcrctl.controller.one_step import OneStep
+from tcrctl.controller.optimum import Demand, optimum
 from tcrctl.controller.plan import Plan, Situation
-from tcrctl.controller.predictor import Forecast, Predictor
+from tcrctl.controller.predictor import Predictor
 from tcrctl.controller.settings import IocSettings, shaken_speed_change
 from tcrctl.controller.static import Static
 from tcrctl.memory import SPEED, Kept
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot
-from tcrctl.signals import Array, Reference
+from tcrctl.signals import Array
 
 #: Choice of predictor by the names of model and prediction; the settings type belongs to the latter.
 PREDICTORS: Final[Mapping[tuple[str, str], Callable[[Any, float, Robot, float], Predictor]]] = {
@@ -37,7 +38,7 @@ PREDICTORS: Final[Mapping[tuple[str, str], Callable[[Any, float, Robot, float], 
 LCP_TOLERANCE: Final = 1e-6
 
 #: Stands for the solution of a problem that was not even built.
-NO_SOLUTION: Final = Solution(np.zeros(0), np.inf, 0, False, 0)
+NO_SOLUTION: Final = Solution(np.zeros(0), np.inf, 0, False, 0, np.zeros((0, 0)))
 
 
 class InstantaneousOptimalControl:
@@ -58,7 +59,8 @@ class InstantaneousOptimalControl:
         self.ahead, self.blocks = self._predictor.grid.ahead, self._predictor.grid.blocks
         self._weights = make_weights(settings, robot.n_cables, self.ahead.size)
         self._shaken = shaken_speed_change(settings)
-        self._needed = np.zeros(robot.n_cables)
+        self._needed, self._no_gain = np.zeros(robot.n_cables), np.zeros((6, robot.n_cables))
+        self._tension = wanted_tension(settings)
 
     def sharpen(self) -> None:
         """Let the predictor solve to rounding."""
@@ -75,65 +77,48 @@ class InstantaneousOptimalControl:
     def plan(self, at: Situation) -> Plan:
         """Find the first block of the optimal inputs."""
         forecast = self._predictor.predict(at)
-        solution, reason = NO_SOLUTION, at.doubt or _doubt(forecast)
+        solution, reason = NO_SOLUTION, at.doubt or ("" if forecast.converged else forecast.reason)
         if not reason:
-            target = make_target(self._settings, at.reference, at.shift, self._m)
-            weights = self._cautious(at.dither.awake)
-            changes = self._free_changes(forecast, at.reference, at.previous)
-            program = build_ioc(forecast.prediction, target, changes, at.low, at.high, weights)
-            solution = solve_ioc(program, forecast.prediction, weights)
-            if not (solution.solved and solution.residual <= LCP_TOLERANCE):
-                reason = f"the complementarity problem was not solved (residual {solution.residual:.2g})"
+            gain = self._no_gain if forecast.rest_gain is None else forecast.rest_gain
+            weights, grid = self._cautious(at.dither.awake), self._predictor.grid
+            solution, self._needed = optimum(forecast.prediction, gain, self._demand(at), grid, weights)
+            reason = _doubt(solution)
         if reason:  # from standstill the speed that the reference needs is a free change
             self._needed = np.zeros(self._m)
+        outputs = solution.outputs if solution.solved else forecast.prediction.free
         return Plan(
             speed=solution.inputs[: self._m],
-            tension=_last_tension(forecast, solution),
+            tension=outputs[-1, POSE_ROWS:].copy(),
             iterations=forecast.iterations,
             residual=forecast.residual,
             lcp_residual=solution.residual,
             lcp_pivots=solution.pivots,
             reason=reason,
-            expected=None if reason else self._expected(at.outputs[:3], forecast, solution),
+            expected=None if reason else self._expected(at.outputs[:3], solution),
         )
 
     def _cautious(self, awake: float) -> Weights:
         """Return the weights, with the W of a dithered robot as far as the dither is awake."""
+        if awake == 0.0:
+            return self._weights
         calm = self._weights.speed_change
         return self._weights._replace(speed_change=calm + awake**2 * (self._shaken - calm))
 
-    def _expected(self, now: Array, forecast: Forecast, solution: Solution) -> Array:
+    def _expected(self, now: Array, solution: Solution) -> Array:
         """Return the end position (3,) [m] one period from now, between now and the first instant."""
-        free, gain = forecast.prediction
-        first = free[0, :3] + gain[0, :3] @ solution.inputs
-        expected: Array = now + (first - now) * (self._settings.period_s / self.ahead[0])
+        expected: Array = now + (solution.outputs[0, :3] - now) * (self._settings.period_s / self.ahead[0])
         return expected
 
-    def _free_changes(self, forecast: Forecast, reference: Reference, previous: Array) -> Array:
-        """Return changes of speed that cost nothing (blocks * m,) [m/s]; see the module ``feedforward``."""
-        needed = np.zeros((self.blocks, self._m))
-        if forecast.rest_gain is not None:
-            weights, poses = self._weights.output[:6], reference_poses(reference)
-            edges = self._predictor.grid.edges
-            needed = needed_speeds(forecast.rest_gain, weights, poses, edges, self.ahead[0])
-        changes = wanted_changes(previous, self._needed, needed)
-        self._needed = needed[0].copy()
-        return changes
+    def _demand(self, at: Situation) -> Demand:
+        """Return what is wanted of the robot in a step."""
+        poses = reference_poses(at.reference)
+        return Demand(poses, at.shift, self._tension, at.previous, self._needed, at.low, at.high)
 
 
-def _doubt(forecast: Forecast) -> str:
-    """Return why no command can be built on a forecast; empty if one can."""
-    if not forecast.converged:
-        return forecast.reason
-    if not (np.isfinite(forecast.prediction.free).all() and np.isfinite(forecast.prediction.gain).all()):
+def _doubt(solution: Solution) -> str:
+    """Return why a solution cannot be used; empty if it can."""
+    if solution.rows == 0:
         return "the prediction is not finite"
+    if not (solution.solved and solution.residual <= LCP_TOLERANCE):
+        return f"the complementarity problem was not solved (residual {solution.residual:.2g})"
     return ""
-
-
-def _last_tension(forecast: Forecast, solution: Solution) -> Array:
-    """Return the tensions at the end of the horizon (m,) [N]; those without any input if there is none."""
-    free, gain = forecast.prediction
-    if not solution.solved:
-        return free[-1, POSE_ROWS:].copy()
-    predicted: Array = free[-1, POSE_ROWS:] + gain[-1, POSE_ROWS:] @ solution.inputs
-    return predicted

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from tcrctl.numerics import block_banded, block_solves
 from tcrctl.numerics.lcp import SOLVED, lcp_residuals, solve_lcp
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.signals import Array
@@ -85,7 +86,8 @@ class Solution(NamedTuple):
         residual: Largest violation of the LCP's conditions.
         pivots: Pivots of Lemke's algorithm, all rounds.
         solved: The LCP was solved and no tension row outside it is violated.
-        rows: Rows of the last LCP.
+        rows: Rows of the last LCP; 0 if there was none.
+        outputs: Y at the prediction instants with these inputs (n, 7 + m); without any if it is not solved.
     """
 
     inputs: Array
@@ -93,6 +95,7 @@ class Solution(NamedTuple):
     pivots: int
     solved: bool
     rows: int
+    outputs: Array
 
 
 @njit(cache=True, error_model="numpy")
@@ -110,23 +113,17 @@ def build_ioc(
         high: Upper limits (blocks * m,) [m/s].
         weights: Weights of the cost.
     """
-    gain = prediction.gain
-    n = gain.shape[0]
-    rows = gain.shape[1]
-    size = gain.shape[2]
-    m = prediction.free.shape[1] - POSE_ROWS
-    H, g = np.zeros((size, size)), np.zeros(size)
+    free, gain = prediction.free, prediction.gain
+    n, rows, size = gain.shape
+    m = rows - POSE_ROWS
+    flat, weighted, error = gain.reshape((n * rows, size)), np.empty((n * rows, size)), np.empty(n * rows)
     for i in range(n):
         for r in range(rows):
-            q = weights.output[r]
-            if q != 0.0:
-                error = q * (prediction.free[i, r] - target[i, r])
-                for a in range(size):
-                    s = gain[i, r, a]
-                    g[a] += error * s
-                    s *= q
-                    for b in range(a, size):
-                        H[a, b] += s * gain[i, r, b]
+            k, q = i * rows + r, weights.output[r]
+            error[k] = q * (free[i, r] - target[i, r])
+            for a in range(size):
+                weighted[k, a] = q * flat[k, a]
+    H, g = np.dot(flat.T, weighted), np.dot(flat.T, error)
     for a in range(size):
         H[a, a] += weights.speed + weights.speed_change
         g[a] -= weights.speed_change * changes[a]
@@ -141,12 +138,21 @@ def build_ioc(
 
 
 @njit(cache=True, error_model="numpy")
-def _violated(prediction: Prediction, weights: Weights, U: Array, chosen: Array) -> int:
+def _outputs(prediction: Prediction, U: Array) -> Array:
+    """Return Y (n, 7 + m)."""
+    n, rows, size = prediction.gain.shape
+    moved = np.dot(prediction.gain.reshape((n * rows, size)), U)
+    Y: Array = prediction.free + moved.reshape((n, rows))
+    return Y
+
+
+@njit(cache=True, error_model="numpy")
+def _violated(outputs: Array, weights: Weights, chosen: Array) -> int:
     """Mark newly violated tension rows in ``chosen`` (n, 2 m), floors then ceilings; returns how many are new."""
     new, m = 0, chosen.shape[1] // 2
-    for i in range(prediction.free.shape[0]):
+    for i in range(outputs.shape[0]):
         for c in range(m):
-            tension = prediction.free[i, POSE_ROWS + c] + np.dot(prediction.gain[i, POSE_ROWS + c], U)
+            tension = outputs[i, POSE_ROWS + c]
             if tension < weights.floor - TENSION_SLACK and not chosen[i, c]:
                 chosen[i, c] = True
                 new += 1
@@ -182,6 +188,37 @@ def _rows(
 
 
 @njit(cache=True, error_model="numpy")
+def _inverse(H: Array) -> Array:
+    """Return the inverse of a positive definite matrix (U, U); NaN if it is not."""
+    factor, inverse = H.copy(), np.eye(H.shape[0])
+    if not block_banded.factor_diagonal(factor):
+        inverse[:] = np.nan
+    block_banded.solve_transposed(factor, inverse)
+    block_banded.solve_upper(factor, inverse)
+    return inverse
+
+
+@njit(cache=True, error_model="numpy")
+def _free_minimum(program: QuadraticProgram) -> Array:
+    """Return the inputs without any limits -H^-1 g (U,); NaN if H is not positive definite."""
+    factor, U = program.H.copy(), -program.g
+    if not block_banded.factor_diagonal(factor):
+        U[:] = np.nan
+    block_solves.transposed_vector(factor, U)
+    block_solves.upper_vector(factor, U)
+    return U
+
+
+@njit(cache=True, error_model="numpy")
+def _inside(program: QuadraticProgram, U: Array) -> bool:
+    """Return whether all inputs are within their limits."""
+    inside = True
+    for a in range(U.shape[0]):
+        inside = inside and program.low[a] <= U[a] <= program.high[a]
+    return inside
+
+
+@njit(cache=True, error_model="numpy")
 def solve_ioc(program: QuadraticProgram, prediction: Prediction, weights: Weights) -> Solution:
     """Solve the program by Lemke's algorithm, adding tension rows until none outside the LCP is violated.
 
@@ -190,19 +227,21 @@ def solve_ioc(program: QuadraticProgram, prediction: Prediction, weights: Weight
         prediction: The prediction it was built of.
         weights: Limits of the tension rows.
     """
-    m = prediction.free.shape[1] - POSE_ROWS
+    m, size = prediction.free.shape[1] - POSE_ROWS, program.g.shape[0]
     chosen = np.zeros((prediction.free.shape[0], 2 * m), dtype=np.bool_)
-    inverse = np.linalg.inv(program.H)
-    U = np.zeros(program.g.shape[0])
-    pivots = 0
-    residual = np.inf
-    rows = 0
+    pivots, rows, residual = 0, 2 * size, np.inf
+    free = _free_minimum(program)
+    if _inside(program, free):  # κ = 0 solves the LCP, and no input stands at a limit
+        Y = _outputs(prediction, free)
+        if _violated(Y, weights, chosen) == 0:
+            return Solution(free, 0.0, 0, True, rows, Y)
+    inverse, U = _inverse(program.H), np.zeros(size)
     for _ in range(MAX_ROUNDS):
         A, b, D = _rows(program, prediction, weights, chosen)
         rows = b.shape[0]
         q = -np.dot(A, np.dot(inverse, program.g)) - b
         kappa, residual = np.zeros(rows), 0.0
-        if not np.min(q) >= 0.0:  # otherwise κ = 0 solves the LCP and no input stands at a limit
+        if not np.min(q) >= 0.0:  # otherwise κ = 0 solves it
             M = np.dot(np.dot(A, inverse), A.T)
             for k in range(rows):
                 M[k, k] += D[k]
@@ -211,8 +250,9 @@ def solve_ioc(program: QuadraticProgram, prediction: Prediction, weights: Weight
             w_low, z_low, product = lcp_residuals(M, q, kappa)
             residual = max(w_low, z_low, product)
             if status != SOLVED:
-                return Solution(U, residual, pivots, False, rows)
+                break
         U = np.dot(inverse, np.dot(kappa, A) - program.g)
-        if _violated(prediction, weights, U, chosen) == 0:
-            return Solution(U, residual, pivots, True, rows)
-    return Solution(U, residual, pivots, False, rows)
+        Y = _outputs(prediction, U)
+        if _violated(Y, weights, chosen) == 0:
+            return Solution(U, residual, pivots, True, rows, Y)
+    return Solution(U, residual, pivots, False, rows, prediction.free)

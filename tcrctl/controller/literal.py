@@ -159,7 +159,7 @@ class LiteralIoc:
         speed = at.previous
         change = np.inf
         iteration = 0
-        solution = Solution(speed, np.inf, 0, False, 0)
+        solution = Solution(speed, np.inf, 0, False, 0, np.zeros((0, 0)))
         while change > EPSILON and iteration < MAX_ITERATIONS and np.all(np.isfinite(q)):
             moved, solution = self._iterate(q, speed, fixed)
             q[3 * FIXED :] += moved

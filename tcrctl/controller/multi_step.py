@@ -16,132 +16,35 @@ is there (controller.drag_share). Drives that lag answer late (controller.drive_
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from tcrctl.controller.blocks import Grid, make_grid, superpose
-from tcrctl.controller.drag_share import DragShare, forget, learn, learning, nothing_known
+from tcrctl.controller.drag_share import learning, nothing_known
 from tcrctl.controller.drive_lag import DriveLag, with_lag
 from tcrctl.controller.inner_map import InnerMap, newton_map
 from tcrctl.controller.ioc import Prediction
+from tcrctl.controller.lasting_offset import MultiStepMemory, update_offset
 from tcrctl.controller.plan import Situation
 from tcrctl.controller.prediction_settings import MultiStepSettings
 from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning, present
-from tcrctl.controller.rest_gain import RestGain, carry, gain_learning, no_gain, rest, tell
-from tcrctl.controller.slip import Slip, follow_slip, no_slip
+from tcrctl.controller.rest_gain import gain_learning, no_gain
+from tcrctl.controller.slip import follow_slip, no_slip
 from tcrctl.controller.tension_gap import TensionGap
 from tcrctl.memory import POSITION, SPEED, Kept
-from tcrctl.robot import linear, pose, response
+from tcrctl.robot import linear, pose, response, response_basis
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
-from tcrctl.robot.hole_drag import HoleDrag, drag_force, fill_hole_drag, no_drag, turn
+from tcrctl.robot.hole_drag import drag_force, fill_hole_drag, no_drag, turn
 from tcrctl.robot.model import Model
-from tcrctl.robot.module import FIXED, SIZE
+from tcrctl.robot.module import FIXED
 from tcrctl.robot.potential import Outcome, minimise
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.robot.robot import Robot, hole_friction
 from tcrctl.robot.sections import FrictionSettings
-from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, StaticMap, follow, rest_map
+from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, follow, rest_map
 from tcrctl.signals import Array
-
-
-class MultiStepMemory(NamedTuple):
-    """What the predictor keeps from step to step, changed in place.
-
-    Attributes:
-        at: Where the model is at rest.
-        offset: Δ (3 n_nodes,) [m].
-        v: Velocities of the last estimate (3 n_nodes,) [m/s].
-        basis: Basis of the response (n_free, modes + m).
-        drag: Drag of the dithered holes.
-        friction: Their friction (n_holes, 3), columns as in ``elements.rubbing_cable``.
-        share: How much of the drag that it gives there is.
-        slip: What that drag follows.
-        learnt: How the offset goes with the drives.
-    """
-
-    at: StaticMap
-    offset: Array
-    v: Array
-    basis: Array
-    drag: HoleDrag
-    friction: Array
-    share: DragShare
-    slip: Slip
-    learnt: RestGain
-
-
-@njit(cache=True, error_model="numpy")
-def _dragged(model: Model, ws: Workspace, memory: MultiStepMemory, turn: float) -> Array:
-    """Return by what usual drag displaces the point that the robot vibrates about (n_free,) [m]."""
-    force, moved = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
-    if turn > 0.0:
-        drag_force(model, memory.drag, memory.slip.v, memory.slip.speed, force)
-        linear.solve(ws, force, moved)
-    return moved
-
-
-@njit(cache=True, error_model="numpy")
-def _told(model: Model, ws: Workspace, memory: MultiStepMemory) -> Array:
-    """Return the same for a robot that follows its drives at once (n_free,) [m]: no noise of cameras is in it."""
-    speed, force, moved = memory.slip.speed, np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0])
-    v = np.zeros(memory.v.shape[0])
-    for k in range(force.shape[0]):
-        for c in range(speed.shape[0]):
-            v[3 * FIXED + k] += memory.at.gain[k, c] * speed[c]
-    drag_force(model, memory.drag, v, speed, force)
-    linear.solve(ws, force, moved)
-    return moved
-
-
-@njit(cache=True, error_model="numpy")
-def _update_offset(
-    model: Model,
-    ws: Workspace,
-    memory: MultiStepMemory,
-    deviation: Array,
-    now: Now,
-    tip: int,
-    tuning: Tuning,
-) -> None:
-    """Filter the displacement of the point that the robot vibrates about: δ + K^-1 (M (a + α v) - drag)."""
-    force, lag, v, period = np.zeros(ws.r.shape[0]), np.zeros(ws.r.shape[0]), now.v, tuning.period
-    for k in range(force.shape[0]):
-        i, row = k // SIZE, k % SIZE
-        for b in range(SIZE):
-            j = SIZE * (i + 1) + b
-            force[k] += model.mass[i, row, b] * ((v[j] - memory.v[j]) / period + model.damping * v[j])
-    linear.solve(ws, force, lag)
-    learns = tuning.gain.doubt > 0.0 and not tuning.rests
-    if learns:
-        carry(memory.learnt, tuning.gain, now.drive + now.behind, memory.offset, tip)
-    dragged = _dragged(model, ws, memory, tuning.turn)
-    if tuning.turn > 0.0:
-        told = _told(model, ws, memory)
-        end = _end(deviation, lag, tip) - memory.learnt.moved
-        learn(memory.share, tuning.learning, end, _end(np.zeros(v.shape[0]), told, tip))
-    else:
-        forget(memory.share, tuning.learning)
-    for k in range(force.shape[0]):
-        lag[k] = deviation[3 * FIXED + k] + lag[k] - memory.share.share[0] * dragged[k]
-    if learns:
-        tell(memory.learnt, tuning.gain, lag, memory.offset, tip)
-    else:
-        rest(memory.learnt, tuning.gain, now.drive + now.behind, tuning.blend)
-        for k in range(force.shape[0]):
-            memory.offset[3 * FIXED + k] += tuning.blend * (lag[k] - memory.offset[3 * FIXED + k])
-
-
-@njit(cache=True, error_model="numpy")
-def _end(base: Array, free: Array, tip: int) -> Array:
-    """Return the mean displacement (3,) of the tip ring in base (3 n_nodes,) plus free (n_free,)."""
-    mean = np.zeros(3)
-    for node in range(tip, tip + 3):
-        for i in range(3):
-            mean[i] += (base[3 * node + i] + free[3 * (node - FIXED) + i]) / 3.0
-    return mean
 
 
 @njit(cache=True, error_model="numpy")
@@ -154,7 +57,7 @@ def forecast(
     grid: Grid,
     tip: int,
     tuning: Tuning,
-) -> tuple[Outcome, bool, Array, Array]:
+) -> tuple[Outcome, bool, Array, Array, Array]:
     """Make one prediction as in the module's docstring, in one kernel.
 
     Args:
@@ -168,21 +71,24 @@ def forecast(
         tuning: Filter and tolerance.
 
     Returns:
-        Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m).
+        Outcome of the statics, whether the response is stable, free (n, 7 + m), gain (n, 7 + m, blocks * m), and
+        position and normal by the drives at rest (6, m).
     """
-    at, q, v = memory.at, now.q, now.v
+    at, q, v, behind = memory.at, now.q, now.v, now.arrived - now.place - now.drive
     outcome = follow(model, load, ws, at, now.drive, tuning.tolerance)
+    if not outcome.converged:
+        linear.couple(ws, ws.r)  # which is done where the model has been followed
     deviation = np.empty(q.shape[0])
     away = np.empty(q.shape[0])
     finite = True
     for k in range(q.shape[0]):
-        deviation[k] = q[k] - at.equilibrium[k]
+        deviation[k] = q[k] + now.age * v[k] - at.equilibrium[k]
         finite = finite and np.isfinite(deviation[k]) and np.isfinite(v[k])
     fill_hole_drag(model, at.equilibrium, ws, memory.friction, tuning.turn, memory.drag)
     if finite:
         follow_slip(memory.slip, now.speed, v, tuning.period, tuning.drives.lag, tuning.follow)
     if outcome.converged and tuning.blend > 0.0 and finite:
-        _update_offset(model, ws, memory, deviation, now, tip, tuning)
+        update_offset(model, ws, memory, deviation, v, now.drive + behind, tip, tuning)
     for hole in range(memory.drag.coefficient.shape[0]):  # what is not learnt is not counted
         memory.drag.coefficient[hole] *= memory.share.share[0]
     for k in range(q.shape[0]):
@@ -193,9 +99,10 @@ def forecast(
     release = response.Release(away, v, memory.learnt.gain)
     drag = response.Drag(memory.drag, held, tuning.follow)
     change, stable = response.respond(model, at.equilibrium, release, grid.ahead, tip, ws, memory.basis, drag)
-    with_lag(change, grid.ahead[0], tuning.drives, now.behind, now.queue)
+    with_lag(change, grid.ahead[0], tuning.drives, behind, now.set_point - now.arrived)
     free, gain = superpose(change, now.outputs, grid.edges)
-    return outcome, stable, free, gain
+    at_rest = pose.drive_gain(at.equilibrium, at.gain + memory.learnt.gain, tip)[:6]
+    return outcome, stable, free, gain, at_rest
 
 
 class MultiStep:
@@ -207,7 +114,9 @@ class MultiStep:
         self.grid = make_grid(settings.instants, settings.blocks, settings.horizon_s)
         tuning = make_tuning(period, settings.filter_s)
         gain = gain_learning(settings.rest_gain, tuning.blend, period)
-        self._tuning = tuning._replace(learning=learning(period), follow=settings.follow_s, gain=gain)
+        self._tuning = tuning._replace(
+            learning=learning(period), follow=settings.follow_s, gain=gain, drives=DriveLag(0.0, dead_time)
+        )
         self._turn = settings.turn_s
         self._dead_time = dead_time
         self._work = make_workspace(robot.model)
@@ -215,7 +124,7 @@ class MultiStep:
         at, still = rest_map(robot), np.zeros_like(robot.rest.q)
         q, drive = robot.rest.q.copy(), np.zeros(robot.n_cables)
         minimise(robot.model, q, drive, self._load, self._work, TOLERANCE, MAX_ITERATIONS, True)
-        basis = response.start_basis(robot.model, self._work, settings.modes)
+        basis = response_basis.start_basis(robot.model, self._work, settings.modes)
         self._memory = MultiStepMemory(
             at,
             still,
@@ -256,16 +165,19 @@ class MultiStep:
         what, at = "Newton on the statics; one LCP after it, not fed back", self._memory.at
         return newton_map(what, self._robot, self._load, at.drive, at.equilibrium) if self._solved else None
 
+    def _tuned(self, turn: float, lag: float) -> Tuning:
+        """Return the tuning for a turn of friction [s/m] and a lag of the drives [s], which seldom change."""
+        if (turn, lag) != (self._tuning.turn, self._tuning.drives.lag):
+            self._tuning = self._tuning._replace(turn=turn, drives=DriveLag(lag, self._dead_time))
+        return self._tuning
+
     def predict(self, at: Situation) -> Forecast:
         """See :class:`Predictor`."""
         robot, memory, estimate = self._robot, self._memory, at.estimate
-        now = present(at)
-        tuning = self._tuning._replace(
-            turn=turn(self._turn, at.dither.amplitude), drives=DriveLag(estimate.lag, self._dead_time)
-        )
+        now, tuning = present(at), self._tuned(turn(self._turn, at.dither.amplitude), estimate.lag)
         if self._fresh > 0:  # the robot rests: all of its deviation is offset, on the mean
             memory.v[:], tuning = estimate.v, tuning._replace(blend=1.0 / self._fresh, turn=0.0, rests=True)
-        outcome, stable, free, gain = forecast(
+        outcome, stable, free, gain, at_rest = forecast(
             robot.model, self._load, self._work, memory, now, self.grid, robot.tip, tuning
         )
         if outcome.converged:
@@ -273,11 +185,8 @@ class MultiStep:
             self._fresh = self._fresh + 1 if self._fresh and at.settling else 0
         good, self._solved = outcome.converged and stable, outcome.converged
         reason = "" if good else "the model has no stable equilibrium at the present drives"
-        at_rest = None
-        if self._feedforward:
-            moved = memory.at.gain + memory.learnt.gain
-            at_rest = pose.drive_gain(memory.at.equilibrium, moved, robot.tip)[:6]
-        return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, at_rest)
+        rest_gain = at_rest if self._feedforward else None
+        return Forecast(Prediction(free, gain), good, outcome.iterations, outcome.residual, reason, rest_gain)
 
 
 def _friction(robot: Robot) -> Array:

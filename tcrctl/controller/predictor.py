@@ -22,13 +22,16 @@ class Now(NamedTuple):
     """What a kernel is told of the present.
 
     Attributes:
-        q: Node positions (3 n_nodes,) [m].
+        q: Node positions as measured (3 n_nodes,) [m].
         v: Node velocities (3 n_nodes,) [m/s].
         drive: Drive lengths d (m,) [m].
         outputs: Outputs as they should be now (7 + m,).
         speed: The last input (m,) [m/s].
-        behind: What the drives have arrived at, without dither, minus where they are (m,) [m].
-        queue: What was sent since (m,) [m].
+        age: Time since q was measured, which v has moved it on [s].
+        set_point: Drive lengths that were sent last (m,) [m].
+        arrived: Those sent a dead time of the drives ago (m,) [m].
+        place: Where the dither has moved the drives (m,) [m]: it is counted as if it ended now, what it has moved
+            comes back, and the prediction is one of the mean.
     """
 
     q: Array
@@ -36,8 +39,10 @@ class Now(NamedTuple):
     drive: Array
     outputs: Array
     speed: Array
-    behind: Array
-    queue: Array
+    age: float
+    set_point: Array
+    arrived: Array
+    place: Array
 
 
 class Tuning(NamedTuple):
@@ -111,10 +116,6 @@ class Predictor(Linearisable, Protocol):
 
 
 def present(at: Situation) -> Now:
-    """Return what a kernel is told of a control step.
-
-    The dither is counted as if it ended now: what it has moved comes back, and the prediction is one of the mean.
-    """
-    x = at.estimate
-    behind = x.arrived - at.dither.place - x.drive
-    return Now(x.q + at.age * x.v, x.v, x.drive, at.outputs, at.previous, behind, x.set_point - x.arrived)
+    """Return what a kernel is told of a control step."""
+    x, place = at.estimate, at.dither.place
+    return Now(x.q, x.v, x.drive, at.outputs, at.previous, at.age, x.set_point, x.arrived, place)

@@ -6,6 +6,7 @@ estimate -> doubt, speed and stroke limits ----------+-> planner -> plan -> limi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -57,7 +58,7 @@ class Shell:
         rests = bool(reason) or at.settling
         self._speed = np.zeros(self._robot.n_cables) if rests else at.within(plan.speed)
         self.dither.expect(None if rests else plan.expected)
-        speed = self._speed if reason else self._shaken(estimate)
+        speed = self._speed if reason else self._shaken(estimate, rests=rests)
         limit = speed_limit(self._settings) - at.dither.fastest
         self._saturated = np.abs(self._speed) >= limit * (1.0 - 1e-9)
         info = ControlInfo(
@@ -73,12 +74,18 @@ class Shell:
         )
         return Command(speed, estimate.drive + self._settings.period_s * speed), info
 
-    def _shaken(self, estimate: Estimate) -> Array:
-        """Return the planned speeds with those of the dither, within all limits (m,) [m/s]."""
+    def _shaken(self, estimate: Estimate, *, rests: bool) -> Array:
+        """Return the planned speeds with those of the dither, within all limits (m,) [m/s].
+
+        Planned ones are within them already, but not the zeros of a robot at rest with a drive outside its stroke.
+        """
         if not self.dither.runs:
             return self._speed
+        if self.dither.sleeps and not rests:
+            self.dither.sleep()
+            return self._speed
         low, high = input_limits(self._settings, self._robot, estimate.drive, 1)
-        return np.asarray(np.clip(self._speed + self.dither.speed(), low, high))
+        return np.asarray(np.minimum(np.maximum(self._speed + self.dither.speed(), low), high))
 
     def _situation(self, estimate: Estimate, reference: Reference) -> Situation:
         """Move the integral action on, and gather what the planner is told."""
@@ -88,7 +95,7 @@ class Shell:
         error = pose_error(reference, now[:3], now[3:6])
         self._normal = now[3:6].copy() if self._settings.output == "pose" else None
         settling = reference.t < self._settings.settling and _rests(reference)
-        stands = settling or (planner.anti_windup and bool(self._saturated.any()))
+        stands = settling or (planner.anti_windup and bool(np.count_nonzero(self._saturated)))
         dither = self.dither.now
         gain = 1.0 + dither.awake * (self._shaken_integral - 1.0)
         shift = self._integral.update(error, stands, gain)
@@ -139,6 +146,6 @@ def _doubt(estimate: Estimate) -> str:
     """Return why no command can be built on an estimate; empty if one can."""
     if not estimate.converged:
         return "the estimator's step did not converge"
-    if not np.isfinite(estimate.q).all():
+    if not math.isfinite(estimate.q.sum()):
         return "the estimate is not finite"
     return ""

@@ -12,7 +12,6 @@ where the robot rests.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -123,7 +122,7 @@ class Static:
     def predict(self, at: Situation) -> Forecast:
         """See :class:`Predictor`. At rest the past does not matter, nor does the age of the estimate."""
         robot, memory = self._robot, self._memory
-        now = present(replace(at, age=0.0))
+        now = present(at)
         outcome, free, gain = forecast(
             robot.model, self._load, self._work, memory, now, self.grid, robot.tip, self._tuning
         )

@@ -7,9 +7,11 @@ that takes this for a cable about to go slack throws the end to save it. Only wh
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
+from numba import njit
 
 from tcrctl.controller.prediction_settings import TensionGapSettings
 from tcrctl.memory import TENSION, Kept
@@ -36,13 +38,23 @@ class TensionGap:
         Args:
             gap: Estimated tensions minus those of the model at rest (m,) [N]; passed over if it is no number.
         """
-        if self._blend == 0.0 or not np.isfinite(gap).all():
+        if self._blend == 0.0 or not math.isfinite(gap.sum()):
             return self._lasting
         if not self._begun:
             self._lasting[:], self._smooth[:], self._begun = gap, gap, True
-        self._lasting += self._blend * (gap - self._lasting)
-        self._smooth += self._quick * (gap - self._smooth)
-        return self._lasting + (gap - self._smooth)
+        left: Array = _left_out(self._lasting, self._smooth, gap, self._blend, self._quick)
+        return left
+
+
+@njit(cache=True, error_model="numpy")
+def _left_out(lasting: Array, smooth: Array, gap: Array, blend: float, quick: float) -> Array:
+    """Move both filters (m,) [N] on by their parts of the way; return what lasts and what is noise (m,) [N]."""
+    left = np.empty(gap.shape[0])
+    for c in range(gap.shape[0]):
+        lasting[c] += blend * (gap[c] - lasting[c])
+        smooth[c] += quick * (gap[c] - smooth[c])
+        left[c] = lasting[c] + (gap[c] - smooth[c])
+    return left
 
 
 def _part(period: float, time: float) -> float:

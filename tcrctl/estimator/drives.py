@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from tcrctl.estimator.lag_search import LagSearch, follow
+from tcrctl.estimator.lag_search import LagSearch, follow, lags
 from tcrctl.memory import POSITION, Kept
 from tcrctl.signals import Array
 
@@ -32,7 +32,7 @@ class BelievedDrives:
     def __init__(self, lag: float | None, dead_time: float, reports: Reports, period: float) -> None:
         """Take time constant (None: to be found), dead time and control period [s], and what the drives report."""
         self.lag = lag or 0.0
-        self._period = period
+        self._lags = lags(np.array([self.lag]), period)
         self._tell = reports == "encoder"
         self._search = LagSearch(period) if lag is None and self._tell else None
         self._late = dead_time / period
@@ -63,19 +63,24 @@ class BelievedDrives:
         first = self._sent.shape[1] == 0
         if first:
             self._sent = np.tile(set_point, (self._sent.shape[0], 1))
-        self._sent[1:] = self._sent[:-1].copy()
-        self._sent[0] = set_point
-        before, self.arrived, self.set_point = self.arrived, self._told(), set_point.copy()
+        before, self.set_point = self.arrived, set_point.copy()
+        self.arrived = self._told(set_point)
         if self._search is not None and not first:
             self._search.observe(self.reached, reported, before, self.arrived)
             self.lag = self._search.lag
         if first or self._tell:
             self.reached = reported.copy()
+        elif self.lag == 0.0:
+            self.reached = self.arrived.copy()
         else:
-            self.reached = follow(self.reached, before, self.arrived, np.array(self.lag), self._period)
+            self.reached = follow(self._lags, self.reached, before, self.arrived)[0]
 
-    def _told(self) -> Array:
-        """Return the set-point of a dead time ago (m,) [m]."""
+    def _told(self, set_point: Array) -> Array:
+        """Take the set-point that is sent now (m,) [m]; return that of a dead time ago."""
+        if self._late == 0.0:
+            return set_point.copy()
+        self._sent[1:] = self._sent[:-1].copy()
+        self._sent[0] = set_point
         i = int(self._late)
         after, before = self._sent[i], self._sent[min(i + 1, len(self._sent) - 1)]
         return np.asarray(after + (self._late - i) * (before - after))

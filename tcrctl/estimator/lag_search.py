@@ -10,9 +10,10 @@ one with the least squared error over the last seconds is believed, and 0 as lon
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+from numba import njit
 
 from tcrctl.signals import Array
 
@@ -24,20 +25,58 @@ FORGET_S: Final = 10.0
 NOTHING: Final = 2e-6
 
 
-def follow(reached: Array, before: Array, now: Array, lag: Array, period: float) -> Array:
-    """Return where drives are at the end of a period (..., m) [m].
+class Lags(NamedTuple):
+    """Time constants that drives may have.
+
+    Attributes:
+        lag: τ (n,) [s].
+        keep: e^(-T/τ) (n,).
+        period: T [s].
+    """
+
+    lag: Array
+    keep: Array
+    period: float
+
+
+def lags(lag: Array, period: float) -> Lags:
+    """Take time constants (n,) and the control period [s]."""
+    with np.errstate(divide="ignore"):
+        return Lags(lag, np.exp(-period / lag), period)
+
+
+@njit(cache=True, error_model="numpy")
+def follow(lags: Lags, reached: Array, before: Array, now: Array) -> Array:
+    """Return where drives of every time constant are at the end of a period (n, m) [m].
 
     Args:
+        lags: Time constants.
         reached: Where they were at its start (m,) [m].
         before: Their set-point then (m,) [m].
         now: Their set-point at its end (m,) [m].
-        lag: Time constants (..., 1) [s].
-        period: Control period [s].
     """
-    with np.errstate(divide="ignore"):
-        keep = np.exp(-period / lag)
-    rise = lag * (now - before) / period
-    return np.asarray(now - rise + keep * (reached - before + rise))
+    found = np.empty((lags.lag.shape[0], now.shape[0]))
+    for i in range(found.shape[0]):
+        for c in range(found.shape[1]):
+            rise = lags.lag[i] * (now[c] - before[c]) / lags.period
+            found[i, c] = now[c] - rise + lags.keep[i] * (reached[c] - before[c] + rise)
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _best(
+    lags: Lags, errors: Array, fade: float, last: Array, reported: Array, before: Array, now: Array
+) -> float:
+    """Let errors (n,) [m2] fade, add those against a report (m,) [m]; return the lag of the least one [s]."""
+    found, best = follow(lags, last, before, now), 0
+    for i in range(found.shape[0]):
+        error = 0.0
+        for c in range(found.shape[1]):
+            error += (found[i, c] - reported[c]) ** 2
+        errors[i] = fade * errors[i] + error
+        if errors[i] < errors[best]:
+            best = i
+    return float(lags.lag[best])
 
 
 class LagSearch:
@@ -49,13 +88,11 @@ class LagSearch:
 
     def __init__(self, period: float) -> None:
         """Begin without lag, in control periods of ``period`` [s]."""
-        self._period = period
+        self._candidates = lags(CANDIDATES, period)
         self._errors = np.where(CANDIDATES > 0.0, NOTHING**2, 0.0)
         self._fade = float(np.exp(-period / FORGET_S))
         self.lag = 0.0
 
     def observe(self, last: Array, reported: Array, before: Array, now: Array) -> None:
         """Compare two reports (m,) [m] with the set-points (m,) [m] that belonged to them."""
-        found = follow(last, before, now, CANDIDATES[:, None], self._period)
-        self._errors = self._fade * self._errors + np.sum((found - reported) ** 2, axis=1)
-        self.lag = float(CANDIDATES[np.argmin(self._errors)])
+        self.lag = _best(self._candidates, self._errors, self._fade, last, reported, before, now)

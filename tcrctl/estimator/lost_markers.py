@@ -36,6 +36,10 @@ class LostMarkers:
     def filled(self, measured: Measurement) -> Measurement:
         """Return the frame with markers filled in that were lost a moment ago."""
         seen = measured.valid
+        if np.count_nonzero(seen) == seen.size:
+            self._missing[:] = self._rings_missing[:] = 0.0
+            self._places[:], self._known[:] = measured.nodes, True
+            return measured
         self._missing = np.where(seen, 0.0, self._missing + self._period)
         places = measured.nodes.astype(np.float64)
         carry(self._places, places, seen, self._known)

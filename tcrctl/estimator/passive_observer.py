@@ -28,19 +28,17 @@ from tcrctl.estimator.calibration import MarkerCalibration
 from tcrctl.estimator.drives import BelievedDrives
 from tcrctl.estimator.exact import TrueState
 from tcrctl.estimator.lost_markers import LostMarkers
+from tcrctl.estimator.observer_update import TOLERANCE, Body, Frame, Observing, Updated, fill_load, update
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.memory import NORMAL, POSITION, SPEED, Kept
-from tcrctl.robot import dynamics, pose
-from tcrctl.robot.equations import FORCE, Q_FREE, SPRING, SPRING_AT, Load, make_workspace
+from tcrctl.robot import dynamics
+from tcrctl.robot.equations import FORCE, make_workspace
 from tcrctl.robot.module import FIXED, ring_rows
 from tcrctl.robot.potential import minimise
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Command, Estimate, Measurement
 
-#: Largest nodal force left by an update [N]: against the virtual springs, 5 nanometres.
-TOLERANCE = 1e-4
-MAX_ITERATIONS = 30
-#: The same for the first frame, which may lie far from the model's rest.
+#: Iterations for the first frame, which may lie far from the model's rest.
 FIT_ITERATIONS = 80
 
 
@@ -51,16 +49,15 @@ class PassiveObserver:
         self, settings: PassiveObserverSettings, robot: Robot, period: float, drives: BelievedDrives
     ) -> None:
         """Take an ``estimator:`` section, the robot, the control period [s] and the drives."""
-        self._robot, self._period, self._drives = robot, period, drives
-        self._stiffness = settings.stiffness_n_m
+        self._robot, self._drives = robot, drives
         self._blend = -float(np.expm1(-period / settings.pose_filter_s))
         rows = np.array(ring_rows(robot.n_modules))
         self._coordinates = (3 * rows[:, None] + np.arange(3)).ravel()
-        self._tip_markers = np.flatnonzero((rows >= robot.tip) & (rows < robot.tip + 3))
-        self._q, self._v = robot.rest.q.copy(), np.zeros_like(robot.rest.q)
-        self._drive = np.zeros(robot.n_cables)
-        self._still = np.zeros(robot.n_cables)
-        self._correction = np.zeros(6)
+        still = np.zeros(robot.n_cables)
+        self._numbers = Observing(
+            period, settings.stiffness_n_m, rows, robot.tip, int(np.argmax(rows == robot.tip)), still
+        )
+        self._body = Body(robot.rest.q.copy(), np.zeros_like(robot.rest.q), still.copy(), np.zeros(6))
         self._updates = 0
         self._fits, self._holds = settings.fit_start, settings.hold_blank
         self._frame = np.zeros((rows.size, 3))
@@ -70,64 +67,41 @@ class PassiveObserver:
         self._work = make_workspace(robot.model)
         self._scratch = dynamics.make_scratch(robot.model)
         self._scratch.nodal[FORCE] = robot.weight
-        self._valid, self._seen = np.zeros(rows.shape[0], dtype=np.bool_), self._coordinates[:0]
-
-    def _load(self, measured: Measurement) -> Load:
-        """Return the inertia of backward Euler, weight and virtual springs of one update."""
-        period = self._period
-        s = self._scratch
-        model = self._robot.model
-        inertia = 1.0 / period**2 + model.damping / period
-        s.nodal[Q_FREE] = self._q + self._v / (period * inertia)
-        if not np.array_equal(measured.valid, self._valid):
-            self._valid = measured.valid.copy()
-            self._seen = self._coordinates[np.repeat(self._valid, 3)]
-            s.nodal[SPRING] = 0.0
-            s.nodal[SPRING, self._seen] = self._stiffness * float(np.mean(self._valid)) ** 2
-        s.nodal[SPRING_AT, self._seen] = measured.nodes[self._valid].ravel()
-        dynamics.lengths_before(model, self._q, self._v, self._drive, self._still, 0.0, s, self._work)
-        return Load(inertia, 1.0 / period, s.nodal, s.bar_before, s.cable_before, None)
+        self._nodes, self._seen = np.zeros((rows.size, 3)), np.zeros(rows.size, dtype=np.bool_)
+        self._told = np.zeros(robot.n_cables)
 
     def _held(self, measured: Measurement) -> Measurement:
         """Return the frame; the last one with markers in the place of a blank one."""
-        if measured.valid.any():
+        count = np.count_nonzero(measured.valid)
+        if count == measured.valid.size:
+            self._frame[:], self._frame_valid[:] = measured.nodes, True
+        elif count > 0:
             self._frame[:] = np.where(measured.valid[:, None], measured.nodes, 0.0)
-            self._frame_valid = measured.valid.copy()
+            self._frame_valid[:] = measured.valid
         elif self._holds and self._frame_valid.any():
-            return replace(measured, nodes=self._frame.astype(measured.nodes.dtype), valid=self._frame_valid)
+            nodes = self._frame.astype(measured.nodes.dtype)
+            return replace(measured, nodes=nodes, valid=self._frame_valid.copy())
         return measured
 
     def _at_markers(self, q: Array) -> Array:
         """Return the nodes that carry markers (n_markers, 3) [m]."""
         return np.asarray(q[self._coordinates].reshape(-1, 3))
 
-    def _fit(self, measured: Measurement) -> None:
+    def _fit(self, frame: Frame) -> None:
         """Fit the resting model to a frame by statics: virtual springs and weight, no inertia, no damping.
 
         So the robot does not seem to jump there in a step. Without a solution the model stays at its own rest.
         """
-        still = self._load(measured)._replace(inertia=0.0, w=0.0)
-        model = self._robot.model
-        q = self._q.copy()
-        drive = measured.drive.copy()
-        if minimise(model, q, drive, still, self._work, TOLERANCE, FIT_ITERATIONS, False).converged:
-            self._q = q
-            self._v = np.zeros_like(q)
-            self._drive = drive
+        model, body = self._robot.model, self._body
+        load = fill_load(model, body, frame, self._numbers, self._scratch, self._work)
+        still, q = load._replace(inertia=0.0, w=0.0), body.q.copy()
+        if minimise(model, q, frame.drive, still, self._work, TOLERANCE, FIT_ITERATIONS, False).converged:
+            self._body = Body(q, np.zeros_like(q), frame.drive.copy(), body.correction)
 
-    def _correct(self, measured: Measurement) -> tuple[Array, Array]:
-        """End position and normal, corrected by what the tip ring's markers say."""
-        tip = self._robot.tip
-        position, normal = pose.position(self._q, tip), pose.normal(self._q, tip)
-        if measured.valid[self._tip_markers].all():
-            ring = measured.nodes[self._tip_markers].astype(float).ravel()
-            error = np.concatenate([pose.position(ring, 0) - position, pose.normal(ring, 0) - normal])
-            self._updates += 1  # the first ones are averaged, then the filter forgets
-            self._correction = self._correction + max(self._blend, 1.0 / self._updates) * (
-                error - self._correction
-            )
-        turned = normal + self._correction[3:]
-        return position + self._correction[:3], turned / np.linalg.norm(turned)
+    def _framed(self, measured: Measurement) -> Frame:
+        """Return a frame for the kernels, which take one type of arrays whoever delivers them."""
+        self._nodes[:], self._seen[:], self._told[:] = measured.nodes, measured.valid, self._drives.reached
+        return Frame(self._nodes, self._seen, self._told)
 
     def sharpen(self) -> None:
         """Let the drives be as they are believed to be now; see :class:`BelievedDrives`."""
@@ -135,13 +109,13 @@ class PassiveObserver:
 
     def memory(self) -> Mapping[str, Kept]:
         """Return positions and velocities without the base, drives, pose correction, and the last frame."""
-        first = 3 * FIXED
+        first, body = 3 * FIXED, self._body
         return {
-            "q": Kept(self._q[first:], POSITION),
-            "v": Kept(self._v[first:], SPEED),
-            "drive": Kept(self._drive, POSITION),
-            "correction_position": Kept(self._correction[:3], POSITION),
-            "correction_normal": Kept(self._correction[3:], NORMAL),
+            "q": Kept(body.q[first:], POSITION),
+            "v": Kept(body.v[first:], SPEED),
+            "drive": Kept(body.drive, POSITION),
+            "correction_position": Kept(body.correction[:3], POSITION),
+            "correction_normal": Kept(body.correction[3:], NORMAL),
             **self._drives.memory(),
             **({"frame": Kept(self._frame.ravel(), POSITION)} if self._holds else {}),
         }
@@ -149,33 +123,37 @@ class PassiveObserver:
     def update(self, measured: Measurement, applied: Command) -> Estimate:
         """Step the model to the time of ``measured``."""
         self._drives.update(measured.drive, applied.drive)
-        measured = self._calibration.corrected(measured, self._at_markers(self._q))
-        measured = replace(self._held(measured), drive=self._drives.reached)
+        if self._calibration.known:
+            measured = self._calibration.corrected(measured, self._at_markers(self._body.q))
+        measured = self._held(measured)
         if self._fits and measured.valid.any():
-            self._fit(measured)
+            self._fit(self._framed(measured))
             self._fits = False
         if self._holds:
             measured = self._lost.filled(measured)
-        load = self._load(measured)
-        q = self._q.copy()
-        model, drive = self._robot.model, measured.drive
-        outcome = minimise(model, q, drive, load, self._work, TOLERANCE, MAX_ITERATIONS, False)
-        if outcome.converged:
-            self._v, self._q, self._drive = (q - self._q) / self._period, q, drive.copy()
-        position, normal = self._correct(measured)
+        blend = max(self._blend, 1.0 / (self._updates + 1))  # at first a mean, then the filter forgets
+        frame, model = self._framed(measured), self._robot.model
+        found = update(model, self._body, frame, self._numbers, blend, self._scratch, self._work)
+        self._body = found.body
+        self._updates += int(found.tip_seen)
+        return self._estimate(measured.t, found)
+
+    def _estimate(self, t: float, found: Updated) -> Estimate:
+        """Return an update at a time [s] as what it says of robot and drives."""
+        body, drives = found.body, self._drives
         return Estimate(
-            t=measured.t,
-            q=self._q,
-            v=self._v,
-            drive=self._drive,
-            set_point=self._drives.set_point,
-            arrived=self._drives.arrived,
-            lag=self._drives.lag,
+            t=t,
+            q=body.q,
+            v=body.v,
+            drive=body.drive,
+            set_point=drives.set_point,
+            arrived=drives.arrived,
+            lag=drives.lag,
             tension=self._work.tension.copy(),
-            position=position,
-            normal=normal,
-            disturbance=load.nodal[SPRING] * (load.nodal[SPRING_AT] - self._q),
-            converged=outcome.converged,
+            position=found.pose[:3],
+            normal=found.pose[3:],
+            disturbance=found.disturbance,
+            converged=found.outcome.converged,
         )
 
 

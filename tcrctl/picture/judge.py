@@ -13,6 +13,7 @@ What is left out is not valid in the measurement that is recorded, so that a rep
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
@@ -27,7 +28,7 @@ from tcrctl.picture.notes import PictureNotes
 from tcrctl.picture.settings import PictureSettings
 from tcrctl.picture.shape import anatomy_of, completed, median_shape, shape_of
 from tcrctl.picture.shares import Shares, is_strange, joint_shares, side_shares
-from tcrctl.picture.suspects import Verdict, judge_joints, wrong_markers, wrong_rings
+from tcrctl.picture.suspects import Suspect, Verdict, judge_joints, wrong_markers, wrong_rings
 from tcrctl.robot.module import RING
 from tcrctl.robot.robot import Robot
 from tcrctl.signals import Array, Measurement
@@ -100,12 +101,15 @@ class PictureJudge:
         nodes, seen = measured.nodes.astype(float), measured.valid
         shape = shape_of(self._anatomy, nodes, seen)
         self._listen(measured.t, shape.side)
-        verdict = self._verdict(nodes, measured, shape)
+        if not self._is_doubtful(shape):
+            self._doubt((), few=False)
+            return measured
+        verdict = self._searched(nodes, seen, shape)
         self._out, self._frame_out = verdict.out, verdict.frame
         left = int(np.count_nonzero(seen & ~verdict.out))
         least = self._settings.least_share
         few = left < least * np.count_nonzero(seen) or 1.0 - verdict.strange < least
-        self._doubt(verdict, few=verdict.frame or bool(few))
+        self._doubt(verdict.suspects, few=verdict.frame or bool(few))
         if not verdict.out.any():
             return measured
         return replace(measured, valid=seen & ~verdict.out)
@@ -121,15 +125,13 @@ class PictureJudge:
             return None
         return PictureError(step, self.doubt)
 
-    def _verdict(self, nodes: Array, measured: Measurement, shape: Shape) -> Verdict:
-        """Return what is not believed; nearly always nothing, which one look tells."""
+    def _is_doubtful(self, shape: Shape) -> bool:
+        """Return whether anything is not believed, or was not; nearly always nothing, which one look tells."""
         if self._unknown:
             self._start = completed(self._start, shape)
             self._unknown = any(np.isnan(part).any() for part in self._start)
-        well = not self._frame_out and not self._out.any()
-        if well and not is_strange(self._start, shape, self._limits, self._noise):
-            return Verdict(np.zeros_like(self._out))
-        return self._searched(nodes, measured.valid, shape)
+        ill = self._frame_out or np.count_nonzero(self._out) > 0
+        return bool(ill or is_strange(self._start, shape, self._limits, self._noise))
 
     def _searched(self, nodes: Array, seen: NDArray[np.bool_], shape: Shape) -> Verdict:
         """Return what is not believed, marker by marker and ring by ring."""
@@ -156,10 +158,10 @@ class PictureJudge:
         if t == before[0]:
             return
         change = typical_change(side, before[1])
-        if not np.isnan(change):
+        if not math.isnan(change):
             self._noise += self._blend * (change / (MEDIAN * TWO_FRAMES) - self._noise)
 
-    def _doubt(self, verdict: Verdict, *, few: bool) -> None:
+    def _doubt(self, suspects: Sequence[Suspect], *, few: bool) -> None:
         if not self.doubt:
             self._held_since = self._now
-        self.doubt = self._notes.note(verdict.suspects, self._now, held=few)
+        self.doubt = self._notes.note(suspects, self._now, held=few)

@@ -43,6 +43,12 @@ def change_since(start: Shape, now: Shape) -> Shape:
 
 
 @njit(cache=True, error_model="numpy")
+def _along(a: Array, b: Array) -> float:
+    """Return the product of two vectors (3,)."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@njit(cache=True, error_model="numpy")
 def measure(
     base: Array, apex: Array, markers: Array, seen: NDArray[np.bool_]
 ) -> tuple[Array, Array, Array, Array]:
@@ -67,10 +73,15 @@ def measure(
         whole = there[0] and there[1] and there[2]
         own, at = (axes_of(ring), centre_of(ring)) if whole else (above, above_at)
         if whole and above_seen:
-            arm = above_at + np.dot(above.T, apex[i]) - at
-            offset[i] = np.dot(own, arm)
-            x, z = np.dot(own, above[0]), np.dot(own, above[2])
-            twist[i], bend[i] = np.arctan2(x[1], x[0]), z[:2]
+            offset[i] = 0.0
+            for k in range(3):
+                for j in range(3):
+                    arm = above_at[j] - at[j]
+                    for axis in range(3):
+                        arm += above[axis, j] * apex[i, axis]
+                    offset[i, k] += own[k, j] * arm
+            twist[i] = np.arctan2(_along(own[1], above[0]), _along(own[0], above[0]))
+            bend[i, 0], bend[i, 1] = _along(own[0], above[2]), _along(own[1], above[2])
         above, above_at, above_seen = own, at, whole
     return side, offset, twist, bend
 

@@ -28,6 +28,8 @@ class PictureNotes:
             now: Time [s].
             held: Whether the drives are held for them.
         """
+        if not (suspects or held or self._held or self._last_ill):
+            return ""
         rings = {suspect.ring for suspect in suspects}
         for suspect in suspects:
             if suspect.ring not in self._last_ill:

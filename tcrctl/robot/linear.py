@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from tcrctl.elements.rubbing_cable import Stretches
-from tcrctl.numerics import block_banded
+from tcrctl.numerics import block_banded, block_solves
 from tcrctl.robot.equations import Workspace
 from tcrctl.robot.module import FIXED
 from tcrctl.signals import Array
@@ -144,10 +144,40 @@ def solve(ws: Workspace, b: Array, x: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def solve_again(ws: Workspace, x: Array) -> None:
+    """Overwrite x (n_free,) by A^-1 x; ``columns`` and ``small`` as :func:`couple` left them."""
+    m = ws.axial.shape[0]
+    block_solves.forward_vector(ws.U, x)
+    weight = np.dot(ws.columns.T, x)
+    block_solves.transposed_vector(ws.small, weight[:m])
+    block_solves.upper_vector(ws.small, weight[:m])
+    weight[m:] = 0.0  # of the right-hand side that lies beside the cables' columns
+    back = np.dot(ws.columns, weight)
+    for k in range(x.shape[0]):
+        x[k] -= back[k]
+    block_solves.backward_vector(ws.U, x)
+
+
+@njit(cache=True, error_model="numpy")
+def _finish_columns(ws: Workspace, X: Array) -> None:
+    """Do as :func:`_finish` for many columns."""
+    m = ws.axial.shape[0]
+    weight = np.dot(ws.columns.T, X)
+    block_banded.solve_transposed(ws.small, weight[:m])
+    block_banded.solve_upper(ws.small, weight[:m])
+    weight[m:] = 0.0  # of the right-hand side that lies beside the cables' columns
+    back = np.dot(ws.columns, weight)
+    for k in range(X.shape[0]):
+        for c in range(X.shape[1]):
+            X[k, c] -= back[k, c]
+    block_solves.backward_columns(ws.U, X)
+
+
+@njit(cache=True, error_model="numpy")
 def solve_many(ws: Workspace, X: Array) -> None:
     """Overwrite columns X (n_free, r) by A^-1 X; ``columns`` and ``small`` as :func:`couple` left them."""
-    block_banded.solve_forward(ws.U, X)
-    _finish(ws, X)
+    block_solves.forward_columns(ws.U, X)
+    _finish_columns(ws, X)
 
 
 @njit(cache=True, error_model="numpy")
@@ -163,7 +193,7 @@ def drive_gain(ws: Workspace, gain: Array) -> None:
         root = np.sqrt(ws.axial[c])
         for i in range(gain.shape[0]):
             gain[i, c] = -root * ws.columns[i, c]
-    _finish(ws, gain)
+    _finish_columns(ws, gain)
 
 
 @njit(cache=True, error_model="numpy")

@@ -64,7 +64,8 @@ class References:
         if not self._known or ahead.size == 0:
             times = (k + in_periods(ahead, self._period)) * self._period
             return sample_reference(self._trajectory, k * self._period, times)
-        if not np.array_equal(ahead, self._ahead) or not 0 <= k - self._block.first < len(self._block.rows):
+        same = ahead is self._ahead or np.array_equal(ahead, self._ahead)
+        if not same or not 0 <= k - self._block.first < len(self._block.rows):
             self._ahead, self._block = ahead, self._asked(k, ahead)
         return self._of_step(k)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tcrctl.numerics import block_banded
+from tcrctl.numerics import block_banded, block_solves
 
 SIZES = st.tuples(st.integers(1, 6), st.integers(1, 3), st.sampled_from([1, 2, 12]), st.integers(1, 7))
 SEEDS = st.integers(0, 10**6)
@@ -90,3 +90,22 @@ def test_a_matrix_that_is_not_finite_is_refused():
 
 def test_a_singular_matrix_is_refused():
     assert not block_banded.factor(np.zeros((3, 2, 12, 12)))
+
+
+@given(size=SIZES, seed=SEEDS)
+def test_vectors_and_many_columns_are_solved_for_alike(size, seed):
+    (n, width, b, r), rng = size, np.random.default_rng(seed)
+    _, U = banded(n, width, b, rng)
+    assert block_banded.factor(U)
+    halves = [
+        (block_banded.solve_forward, block_solves.forward_columns, block_solves.forward_vector),
+        (block_banded.solve_backward, block_solves.backward_columns, block_solves.backward_vector),
+    ]
+    for plain, columns, vector in halves:
+        X = rng.standard_normal((n * b, r))
+        expected, many, one = X.copy(), X.copy(), X[:, 0].copy()
+        plain(U, expected)
+        columns(U, many)
+        vector(U, one)
+        np.testing.assert_allclose(many, expected, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(one, expected[:, 0], rtol=1e-9, atol=1e-12)

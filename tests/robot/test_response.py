@@ -10,7 +10,7 @@ from support import mechanics
 from support.mechanics import FREE
 from tcrctl.elements.sliding_cable import STIFFNESS
 from tcrctl.numerics import block_banded
-from tcrctl.robot import dynamics, linear, pose, response
+from tcrctl.robot import dynamics, linear, pose, response, response_basis
 from tcrctl.robot.equations import assemble, make_workspace
 from tcrctl.robot.equilibrium import equilibrium, static_load
 from tcrctl.robot.hole_drag import fill_hole_drag, no_drag, turn
@@ -41,13 +41,14 @@ class Bent:
         self.drive = 0.012 + 0.004 * np.cos(np.arange(robot.n_cables))
         self.rest = equilibrium(self.model, self.drive, robot.weight, robot.rest.q)
         assert (self.rest.tension > 1.0).all()
-        self.basis = response.start_basis(self.model, self.workspace(), basis_modes)
+        self.basis = response_basis.start_basis(self.model, self.workspace(), basis_modes)
 
     def workspace(self):
         ws = make_workspace(self.model)
         load = static_load(self.model, self.robot.weight)
         assemble(self.model, self.rest.q, self.drive, load, ws, np.bool_(True))
         assert linear.factor_shifted(ws.K, ws.U) == 0.0
+        linear.couple(ws, ws.r)
         return ws
 
     def respond(self, offset, v, step, steps, drag=None, held=None, turn=0.0, gain=None):
@@ -182,6 +183,20 @@ def test_the_basis_holds_the_slowest_modes_and_the_static_answers(robot):
         assert np.linalg.norm(outside) < 1e-5 * np.linalg.norm(shape)
 
 
+def test_the_basis_comes_with_the_stiffness_and_the_cable_lengths_on_it(robot):
+    bent = Bent(robot)
+    ws, V = bent.workspace(), bent.basis.copy()
+    reduced = response_basis.refine_basis(bent.model, ws, V)
+    KV, MV = np.empty(V.shape), np.empty(V.shape)
+    block_banded.multiply_columns(ws.K, V, KV)
+    response_basis.mass_columns(bent.model.mass, V, MV)
+    GV = ws.G[:, FREE:] @ V
+    stiffness = V.T @ KV + GV.T @ (ws.axial[:, None] * GV)
+    np.testing.assert_allclose(reduced.weighted, MV, atol=1e-12 * np.abs(MV).max())
+    np.testing.assert_allclose(reduced.lengths, GV, atol=1e-9 * np.abs(GV).max())
+    np.testing.assert_allclose(reduced.stiffness, stiffness, atol=1e-9 * np.abs(stiffness).max())
+
+
 def test_a_slack_cable_keeps_its_authority_over_its_predicted_tension(tcr700):
     bent = Bent(tcr700)
     ws = bent.workspace()
@@ -222,7 +237,7 @@ def dense(bent, drag, time):
     """System matrix of (δ, δ', f, t, 1), and its columns for unit ramps, from dense matrices."""
     ws, size, m = bent.workspace(), bent.basis.shape[0], bent.robot.n_cables
     mass, stiffness = np.empty((size, size)), np.empty((size, size))
-    response.mass_columns(bent.model.mass, np.eye(size), mass)
+    response_basis.mass_columns(bent.model.mass, np.eye(size), mass)
     block_banded.multiply_columns(ws.K, np.eye(size), stiffness)
     G, axial = ws.G[:, FREE:], bent.model.cables[:, STIFFNESS]
     stiffness += G.T @ (axial[:, None] * G)
