@@ -1,4 +1,7 @@
-"""``kind: open_loop``: moves the drives to the lengths that the trajectory gives, whatever the end does."""
+"""``kind: open_loop``: moves the drives to the lengths that the trajectory gives, whatever the end does.
+
+Set-points follow the trajectory, not the drives: those that lag, and answer after a dead time, would be chased.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,7 @@ class OpenLoop:
         """
         if reference.drive is None:
             raise InputError("controller.kind: open_loop needs trajectory.kind: drives")
-        wanted = (np.clip(reference.drive, *self._stroke) - estimate.drive) / self._period
+        wanted = (np.clip(reference.drive, *self._stroke) - estimate.set_point) / self._period
         speed = np.clip(wanted, -self._limit, self._limit)
         info = ControlInfo(
             converged=True,
@@ -57,4 +60,4 @@ class OpenLoop:
             predicted_tension=estimate.tension,
             integral=np.zeros(6),
         )
-        return Command(speed, estimate.drive + self._period * speed), info
+        return Command(speed, estimate.set_point + self._period * speed), info

@@ -14,7 +14,9 @@ from tcrctl.controller.settings import OpenLoopSettings
 from tcrctl.errors import InfeasibleError, InputError, SpecError
 from tcrctl.experiment.feasibility import DriveLimits, check_drives
 from tcrctl.experiment.prepare import plan, prepare
+from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.spec import load_spec
+from tcrctl.log.reader import read_log
 from tcrctl.numerics.rotation import angle_between
 from tcrctl.robot import pose
 from tcrctl.robot.description import load_robot
@@ -102,7 +104,9 @@ def test_the_duration_is_that_of_all_legs_and_rests(times):
 
 def estimate(drive):
     nothing = np.zeros(3)
-    return Estimate(0.0, nothing, nothing, drive, np.full(3, 5.0), nothing, nothing, nothing, True)
+    return Estimate(
+        0.0, nothing, nothing, drive, np.full(3, 5.0), nothing, nothing, nothing, True, set_point=drive
+    )
 
 
 def followed(robot, trajectory, steps, **settings):
@@ -132,6 +136,19 @@ def test_drives_keep_the_speed_limit_and_catch_up_later(robot, trajectory):
     assert saturated.any()
     assert not saturated[-1]
     assert np.allclose(drives[-1], [0.040, 0.030, 0.025], atol=1e-12)
+
+
+def test_drives_that_lag_and_answer_late_are_not_chased(tmp_path):
+    """Their set-points are those that drives without lag get; the drives come to rest with them."""
+    slow = "plant.drives={lag_s: 0.1, dead_time_s: 0.05, reports: encoder}"
+    told = []
+    for overrides in ((), (slow,)):
+        prepared = prepare(load_spec("dynamic_drive", (*overrides, "plant.step_ms=5")))
+        run_experiment(prepared, out=tmp_path / str(len(told)))
+        log = read_log(next((tmp_path / str(len(told))).glob("*/log.mcap")))
+        told.append(log.columns(["applied_drive", "measurement_drive"]))
+    assert np.abs(told[1]["applied_drive"] - told[0]["applied_drive"]).max() < 1e-9
+    assert np.abs(told[1]["measurement_drive"][-1] - told[1]["applied_drive"][-1]).max() < 1e-4
 
 
 def test_the_start_blend_leaves_the_drives_alone(robot, trajectory):
