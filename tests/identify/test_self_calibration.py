@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from tcrctl.elements import sliding_cable
+from tcrctl.errors import NoEquilibriumError
 from tcrctl.identify.calibration.answer_of_drives import fit_answer, followed
 from tcrctl.identify.calibration.body import Body
 from tcrctl.identify.calibration.design import choose, sensitivities
-from tcrctl.identify.calibration.fit import Calibrator
+from tcrctl.identify.calibration.fit import HALVINGS, Calibrator
 from tcrctl.identify.calibration.judgement import undetermined
 from tcrctl.identify.calibration.loose import hole_forces
 from tcrctl.identify.calibration.rests import Rests, stop
@@ -135,6 +136,25 @@ def test_noisy_markers_give_values_within_their_deviations(body, drives):
     assert np.sqrt(np.mean(off**2)) < 1.5
     assert np.abs(off).max() < 5.0
     assert np.all(spread_of(body, fit) <= body.unknowns.prior * (1.0 + 1e-6))
+
+
+def test_a_step_to_a_robot_without_a_stable_shape_is_halved(body, drives):
+    """Cables so short that the robot tears: half of the way, or a quarter, leaves it whole."""
+    calibrator, x = (
+        Calibrator(body, seen(body, drives, np.zeros(len(body.unknowns))), SPEC),
+        np.zeros(len(body.unknowns)),
+    )
+    torn = x.copy()
+    torn[body.unknowns.of("zeros")] = -1.0
+    with pytest.raises(NoEquilibriumError):
+        list(calibrator._shapes.at(torn))
+    assert np.isnan(calibrator.residual(torn)).all()
+    assert np.abs(calibrator.residual(x)).max() < 1e-9
+    went, rows = calibrator._towards(x, torn)
+    part = went[body.unknowns.of("zeros")] / torn[body.unknowns.of("zeros")]
+    assert len(rows) == len(drives)
+    assert 2.0**-HALVINGS < part[0] < 1.0
+    assert np.allclose(np.log2(part), np.round(np.log2(part[0])))
 
 
 def test_a_rest_with_an_outlier_counts_less(body, drives):

@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from tcrctl.errors import NoEquilibriumError
 from tcrctl.identify.calibration.body import Body
 from tcrctl.identify.calibration.rests import Rests
 from tcrctl.identify.calibration.settings import SelfCalibrationSpec
@@ -26,6 +27,8 @@ from tcrctl.signals import Array
 LONGEST: Final = 3.0
 #: A step below this, in the same measure, is the last one.
 SMALL: Final = 0.02
+#: A step to a robot without a stable shape is halved so many times.
+HALVINGS: Final = 8
 #: Degrees of freedom of Student's distribution over rests.
 FREEDOM: Final = 4.0
 
@@ -53,6 +56,10 @@ class Fit:
     converged: bool
 
 
+#: Slopes by x over its prior and residuals of a rest, both in standard deviations; and the residuals as they are.
+Row = tuple[Array, Array, Array]
+
+
 class Calibrator:
     """One robot, its rests and what is assumed of them."""
 
@@ -65,17 +72,17 @@ class Calibrator:
         """Find the unknowns.
 
         Args:
-            start: Where to begin (n,); zeros if None.
+            start: Where to begin (n,), or as near to it as the robot has stable shapes; zeros if None.
             told: Takes the number of steps so far.
 
         Raises:
-            NoEquilibriumError: If the robot has no stable shape on the way.
+            NoEquilibriumError: If the robot as described has no stable shape at a rest, or none on the way.
         """
         prior = self.body.unknowns.prior
-        x = np.zeros(prior.size) if start is None else start.copy()
-        weight, step, k = np.ones(len(self._rests.t)), np.inf, 0
+        nowhere = np.zeros(prior.size)
+        x, rows = self._towards(nowhere, nowhere if start is None else start)
+        step, k = np.inf, 0
         while True:
-            rows = [self._whitened(x, i, shape) for i, shape in enumerate(self._shapes.at(x))]
             weight = self._weights([residual for _, residual, _ in rows])
             J = np.vstack([np.sqrt(w) * slopes for w, (slopes, _, _) in zip(weight, rows, strict=True)])
             r = np.concatenate([np.sqrt(w) * res for w, (_, res, _) in zip(weight, rows, strict=True)])
@@ -84,15 +91,28 @@ class Calibrator:
             if step < SMALL or k == self._spec.iterations:
                 break
             move = np.linalg.solve(information, J.T @ r - x / prior)
-            step = float(np.abs(move).max())
-            x, k = x + prior * move * (LONGEST / max(step, LONGEST)), k + 1
+            step, k = float(np.abs(move).max()), k + 1
+            x, rows = self._towards(x, prior * move * (LONGEST / max(step, LONGEST)))
         covariance = np.linalg.inv(information) * np.outer(prior, prior)
         residual = np.array([raw for _, _, raw in rows])
         return Fit(x, covariance, residual, weight, float(r @ r / max(r.size, 1)), k, step < SMALL)
 
+    def _towards(self, x: Array, move: Array) -> tuple[Array, list[Row]]:
+        """Go from unknowns x (n,) by as much of a move as leaves stable shapes everywhere; return the rows, too."""
+        for _ in range(HALVINGS):
+            try:
+                shapes = list(self._shapes.at(x + move))
+            except NoEquilibriumError:
+                move = 0.5 * move
+            else:
+                return x + move, [self._whitened(x + move, i, shape) for i, shape in enumerate(shapes)]
+        return x, [self._whitened(x, i, shape) for i, shape in enumerate(self._shapes.at(x))]
+
     def residual(self, x: Array) -> Array:
-        """Return reported minus predicted markers for unknowns x (k, 3 n_markers) [m]."""
-        return np.array([self._raw(x, i, shape)[0] for i, shape in enumerate(self._shapes.at(x))])
+        """Return reported minus predicted markers (k, 3 n_markers) [m]; NaN at a rest without a stable shape."""
+        unseen = np.full(self._rests.markers[0].size, np.nan)
+        shapes = enumerate(self._shapes.where_stable(x))
+        return np.array([unseen if shape is None else self._raw(x, i, shape)[0] for i, shape in shapes])
 
     def _raw(self, x: Array, i: int, shape: Shape) -> tuple[Array, Array]:
         predicted, slopes = self._sight.of(x, shape)

@@ -48,7 +48,7 @@ class Errors:
     @classmethod
     def of(cls, residual: Array, end: NDArray[np.int64]) -> Errors:
         """Judge residuals (k, 3 n_markers) [m]; ``end`` says which markers are those of the end ring (3,)."""
-        if not len(residual):
+        if not np.isfinite(residual).any():
             return cls(math.nan, math.nan, math.nan)
         markers = 1e3 * residual.reshape(len(residual), -1, 3)
         distance = np.linalg.norm(markers[:, end].mean(axis=1), axis=1)

@@ -89,6 +89,12 @@ def calibrate(
     notify(f"without those held out: {first.iterations} steps, misfit {first.misfit:.2f}")
     whole = Calibrator(body, rests, spec)
     before, without = whole.residual(zero), Calibrator(body, rests.only(kept), spec).residual(first.x)
+    for residual, who in ((before, "as described"), (without, "as found without those held out")):
+        missing = int(np.isnan(residual).all(axis=1).sum())
+        if missing:
+            notify(
+                f"{missing} of {len(residual)} rests have no stable shape of the robot {who}; errors leave them out"
+            )
     done = first.iterations
     fit = whole.fit(first.x, told=lambda k: progress(done + k, done + most))
     notify(f"with all: {fit.iterations} steps, misfit {fit.misfit:.2f}")

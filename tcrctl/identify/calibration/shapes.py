@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tcrctl.errors import NoEquilibriumError
 from tcrctl.identify.calibration.body import Body
 from tcrctl.identify.calibration.loose import hole_forces, holes_of_cables
 from tcrctl.identify.calibration.rests import Rests
@@ -52,6 +53,15 @@ class Shapes:
         side, twins = self._body.side(x), self._body.twins(x)
         for k in range(len(self._last)):
             yield self._shape(k, x, side, twins)
+
+    def where_stable(self, x: Array) -> Iterator[Shape | None]:
+        """Yield the shapes of all rests for unknowns x (n,), None for those that have no stable one."""
+        side, twins = self._body.side(x), self._body.twins(x)
+        for k in range(len(self._last)):
+            try:
+                yield self._shape(k, x, side, twins)
+            except NoEquilibriumError:
+                yield None
 
     def _shape(self, k: int, x: Array, side: Side, twins: tuple[Twins, ...]) -> Shape:
         u, rests = self._body.unknowns, self._rests
