@@ -104,8 +104,9 @@ def test_names_that_no_run_has_are_told(here, capsys):
     (folder / "summary.json").write_text(json.dumps({"run_id": "one", "status": "success", "seed": 1}))
     code, printed = said(capsys, "runs", "logs", "--where", "sed=1", "--sort", "-statis")
     assert code == 0
-    assert [line.split()[-1] for line in printed.err.splitlines()] == ["sed", "statis"]
-    assert said(capsys, "runs", "logs", "--where", "seed=2", "--sort", "status")[1].err == ""
+    assert [line.split()[-1] for line in printed.err.splitlines()] == ["sed", "statis", "sed=1"]
+    told = said(capsys, "runs", "logs", "--where", "seed=2", "--sort", "status")[1].err
+    assert told == "no run in logs with seed=2\n"
 
 
 @pytest.mark.parametrize(

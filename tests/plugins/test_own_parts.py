@@ -156,7 +156,7 @@ BROKEN = {
     "NaN": (
         OWN_ESTIMATOR,
         UPDATE,
-        "return replace(self.inner.update(measured, applied), q=float('nan') * self.inner._q)",
+        "found = self.inner.update(measured, applied); return replace(found, q=float('nan') * found.q)",
         "update returned q that is not finite",
     ),
     "shape": (

@@ -8,6 +8,7 @@ fit much worse than the others (Student's distribution). The posterior covarianc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -110,9 +111,11 @@ class Calibrator:
 
     def residual(self, x: Array) -> Array:
         """Return reported minus predicted markers (k, 3 n_markers) [m]; NaN at a rest without a stable shape."""
-        unseen = np.full(self._rests.markers[0].size, np.nan)
-        shapes = enumerate(self._shapes.where_stable(x))
-        return np.array([unseen if shape is None else self._raw(x, i, shape)[0] for i, shape in shapes])
+        found = np.full((len(self._rests.t), math.prod(self._rests.markers.shape[1:])), np.nan)
+        for i, shape in enumerate(self._shapes.where_stable(x)):
+            if shape is not None:
+                found[i] = self._raw(x, i, shape)[0]
+        return found
 
     def _raw(self, x: Array, i: int, shape: Shape) -> tuple[Array, Array]:
         predicted, slopes = self._sight.of(x, shape)

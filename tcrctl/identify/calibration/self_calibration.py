@@ -90,10 +90,10 @@ def calibrate(
     whole = Calibrator(body, rests, spec)
     before, without = whole.residual(zero), Calibrator(body, rests.only(kept), spec).residual(first.x)
     for residual, who in ((before, "as described"), (without, "as found without those held out")):
-        missing = int(np.isnan(residual).all(axis=1).sum())
-        if missing:
+        unstable = int(np.isnan(residual).all(axis=1).sum())
+        if unstable:
             notify(
-                f"{missing} of {len(residual)} rests have no stable shape of the robot {who}; errors leave them out"
+                f"no stable shape of the robot {who} at {unstable} of {len(residual)} rests: they do not count"
             )
     done = first.iterations
     fit = whole.fit(first.x, told=lambda k: progress(done + k, done + most))
