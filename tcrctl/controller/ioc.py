@@ -188,22 +188,27 @@ def _rows(
 
 
 @njit(cache=True, error_model="numpy")
-def _inverse(H: Array) -> Array:
-    """Return the inverse of a positive definite matrix (U, U); NaN if it is not."""
-    factor, inverse = H.copy(), np.eye(H.shape[0])
+def _factor(H: Array) -> Array:
+    """Return the Cholesky factor of a positive definite matrix (U, U); NaN if it is not."""
+    factor = H.copy()
     if not block_banded.factor_diagonal(factor):
-        inverse[:] = np.nan
+        factor[:] = np.nan
+    return factor
+
+
+@njit(cache=True, error_model="numpy")
+def _inverse(factor: Array) -> Array:
+    """Return H^-1 (U, U) for the factor of H."""
+    inverse = np.eye(factor.shape[0])
     block_banded.solve_transposed(factor, inverse)
     block_banded.solve_upper(factor, inverse)
     return inverse
 
 
 @njit(cache=True, error_model="numpy")
-def _free_minimum(program: QuadraticProgram) -> Array:
-    """Return the inputs without any limits -H^-1 g (U,); NaN if H is not positive definite."""
-    factor, U = program.H.copy(), -program.g
-    if not block_banded.factor_diagonal(factor):
-        U[:] = np.nan
+def _free_minimum(factor: Array, g: Array) -> Array:
+    """Return the inputs without any limits -H^-1 g (U,) for the factor of H."""
+    U = -g
     block_solves.transposed_vector(factor, U)
     block_solves.upper_vector(factor, U)
     return U
@@ -230,12 +235,13 @@ def solve_ioc(program: QuadraticProgram, prediction: Prediction, weights: Weight
     m, size = prediction.free.shape[1] - POSE_ROWS, program.g.shape[0]
     chosen = np.zeros((prediction.free.shape[0], 2 * m), dtype=np.bool_)
     pivots, rows, residual = 0, 2 * size, np.inf
-    free = _free_minimum(program)
+    factor = _factor(program.H)
+    free = _free_minimum(factor, program.g)
     if _inside(program, free):  # κ = 0 solves the LCP, and no input stands at a limit
         Y = _outputs(prediction, free)
         if _violated(Y, weights, chosen) == 0:
             return Solution(free, 0.0, 0, True, rows, Y)
-    inverse, U = _inverse(program.H), np.zeros(size)
+    inverse, U = _inverse(factor), np.zeros(size)
     for _ in range(MAX_ROUNDS):
         A, b, D = _rows(program, prediction, weights, chosen)
         rows = b.shape[0]

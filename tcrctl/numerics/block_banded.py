@@ -94,19 +94,8 @@ def _subtract_transposed_product(target: Array, left: Array, right: Array) -> No
 
 @njit(cache=True, error_model="numpy")
 def _subtract_product(target: Array, left: Array, right: Array) -> None:
-    """Subtract left right from ``target``, all row-major; four rows of ``right`` at a time, like the above."""
-    rows, cols = target.shape
-    whole = right.shape[0] - right.shape[0] % LANES
-    for k in range(0, whole, LANES):
-        for r in range(rows):
-            f0, f1, f2, f3 = left[r, k], left[r, k + 1], left[r, k + 2], left[r, k + 3]
-            for c in range(cols):
-                three = ((target[r, c] - f0 * right[k, c]) - f1 * right[k + 1, c]) - f2 * right[k + 2, c]
-                target[r, c] = three - f3 * right[k + 3, c]
-    for k in range(whole, right.shape[0]):
-        for r in range(rows):
-            for c in range(cols):
-                target[r, c] -= left[r, k] * right[k, c]
+    """Subtract left right from ``target``, all row-major."""
+    _subtract_transposed_product(target, left.T, right)
 
 
 @njit(cache=True, error_model="numpy")
