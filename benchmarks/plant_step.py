@@ -31,6 +31,7 @@ from tcrctl.robot.equations import FORCE, Load, assemble, make_workspace
 from tcrctl.robot.module import FIXED
 from tcrctl.robot.robot import Robot, build_robot, hole_friction
 from tcrctl.robot.sections import FrictionSettings
+from tcrctl.robot.unworn import unworn
 from tcrctl.signals import Array, Command
 
 RHO = 0.8
@@ -49,7 +50,7 @@ def run(robot: Robot, seconds: float, h: float, friction: float | None = None) -
     model, m, slip = robot.model, robot.n_cables, None
     if friction is not None:
         holes = hole_friction(FrictionSettings(coefficient=friction), model.first_hole)
-        slip = dynamics.unworn(model, robot.rest.q, np.zeros(m), robot.rest.tension, holes)
+        slip = unworn(model, robot.rest.q, np.zeros(m), robot.rest.tension, holes)
     state = dynamics.rest_state(robot.rest.q, np.zeros(m), slip)
     work, scratch = make_workspace(model, rubbing=slip is not None), dynamics.make_scratch(model)
     times, iterations, rule = [], [], dynamics.Rule(h, RHO)

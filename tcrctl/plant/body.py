@@ -10,10 +10,12 @@ from tcrctl.plant.creep import Creep
 from tcrctl.plant.own_robot import friction_of
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.spring_hysteresis import SpringHysteresis
+from tcrctl.plant.time_step import LONGEST_MS, fixed_ms
 from tcrctl.robot import dynamics
 from tcrctl.robot.equations import make_workspace
 from tcrctl.robot.equilibrium import equilibrium
 from tcrctl.robot.robot import Robot
+from tcrctl.robot.unworn import lead_direction, unworn
 from tcrctl.signals import Array
 
 
@@ -21,6 +23,26 @@ def relaxes(settings: SimulatedSettings) -> bool:
     """Return whether something has to happen to a robot between internal steps."""
     creeps = settings.cables is not None and bool(settings.cables.creep)
     return creeps or settings.springs_hysteresis is not None
+
+
+def steps_one_by_one(settings: SimulatedSettings) -> bool:
+    """Return whether a plant has something that happens between internal steps."""
+    return relaxes(settings) or settings.drives is not None or settings.cameras is not None
+
+
+def chooses_steps(settings: SimulatedSettings) -> bool:
+    """Return whether internal steps are as long as their error lets them be, if nothing rubs."""
+    return settings.step_ms == "auto" and not steps_one_by_one(settings)
+
+
+def _rule(settings: SimulatedSettings, rubs: bool) -> dynamics.Rule:
+    """Return how time is integrated.
+
+    What rubs goes by fixed steps: where it sticks is decided once per step, and an error has no order.
+    """
+    if rubs or not chooses_steps(settings):
+        return dynamics.Rule(fixed_ms(settings.step_ms) / 1000.0, settings.spectral_radius)
+    return dynamics.Rule(LONGEST_MS / 1000.0, settings.spectral_radius, settings.step_error_um * 1e-6)
 
 
 class Body:
@@ -42,16 +64,16 @@ class Body:
         rest = robot.rest
         if np.any(drive != 0.0) or settings.start_drives_mm is not None:
             rest = equilibrium(robot.model, drive, robot.weight, robot.rest.q)
-        self._rule = dynamics.Rule(settings.step_ms / 1000.0, settings.spectral_radius)
         holes = friction_of(settings, robot)
-        slip = None if holes is None else dynamics.unworn(robot.model, rest.q, drive, rest.tension, holes)
+        slip = None if holes is None else unworn(robot.model, rest.q, drive, rest.tension, holes)
         self.state = dynamics.rest_state(rest.q, drive, slip)
+        self._rule = _rule(settings, rubs=slip is not None)
         loss = settings.springs_hysteresis
         self._hysteresis = None if loss is None else SpringHysteresis(loss, robot.model, rest.q)
         self.model = robot.model if self._hysteresis is None else self._hysteresis.model
         self._work = make_workspace(self.model, rubbing=slip is not None)
         self._scratch = dynamics.make_scratch(self.model)
-        self._scratch.lead[:] = dynamics.lead_direction(rest.q)
+        self._scratch.lead[:] = lead_direction(rest.q)
         self.tension = self._work.tension
         self.tension[:] = rest.tension
         self.late = np.zeros_like(drive)

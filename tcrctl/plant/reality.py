@@ -10,20 +10,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tcrctl.plant.body import Body, relaxes
+from tcrctl.plant.body import Body
 from tcrctl.plant.cameras import ImperfectCameras
 from tcrctl.plant.drives import SimulatedDrives
 from tcrctl.plant.reality_settings import CameraSettings, DriveSettings
 from tcrctl.plant.settings import SimulatedSettings
+from tcrctl.plant.time_step import fixed_ms
 from tcrctl.signals import Array
 
 #: Drives that do what they are told.
 IDEAL_DRIVES = DriveSettings(reports="set_point")
-
-
-def steps_one_by_one(settings: SimulatedSettings) -> bool:
-    """Return whether a plant has something that happens between internal steps."""
-    return relaxes(settings) or settings.drives is not None or settings.cameras is not None
 
 
 def real_drives(settings: SimulatedSettings, start: Array, period: float) -> SimulatedDrives:
@@ -33,7 +29,7 @@ def real_drives(settings: SimulatedSettings, start: Array, period: float) -> Sim
 
 def steps(settings: SimulatedSettings, period: float) -> int:
     """Return the number of internal steps in a control period [s]."""
-    return max(1, round(1000.0 * period / settings.step_ms))
+    return max(1, round(1000.0 * period / fixed_ms(settings.step_ms)))
 
 
 class Reality:

@@ -21,6 +21,7 @@ from tcrctl.plant.reality_settings import (
     ScatterSettings,
     Seed,
 )
+from tcrctl.plant.time_step import FIXED_MS, Step
 from tcrctl.robot.sections import FrictionSettings
 
 
@@ -111,9 +112,13 @@ class SimulatedSettings(PlantSection):
     """The robot's equations of motion, integrated by the generalized-alpha method."""
 
     kind: Literal["simulated"]
-    step_ms: float = quantity(
-        "ms", "internal time step; a whole number of them makes a control period", 1.0, gt=0
+    step_ms: Step = quantity(
+        "ms",
+        "internal time step, a whole number of them makes a control period; auto: as long as step_error_um lets it "
+        "be, for a plant without friction and other effects of real ones, 1 for others",
+        FIXED_MS,
     )
+    step_error_um: float = quantity("um", "largest error of an internal step if step_ms is auto", 0.1, gt=0)
     spectral_radius: float = quantity(
         "1", "spectral radius of the integrator at infinite frequency", 0.8, ge=0, le=1
     )
@@ -164,6 +169,8 @@ class SimulatedSettings(PlantSection):
 
     def misfits(self, period_s: float) -> Iterator[Finding]:
         """Yield that no whole number of steps makes a control period [s]."""
+        if self.step_ms == "auto":
+            return
         steps = period_s * 1e3 / self.step_ms
         if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
             what = f"{period_s:g} s must be a whole number of steps; with {self.step_ms:g} ms it is {steps:g}"

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcrctl.memory import ACCELERATION, POSITION, SPEED, Kept
-from tcrctl.plant.body import Body
+from tcrctl.plant.body import Body, chooses_steps, steps_one_by_one
 from tcrctl.plant.disturbances import pushed, seen
 from tcrctl.plant.own_robot import moving_robot
-from tcrctl.plant.reality import Reality, real_drives, steps_one_by_one
+from tcrctl.plant.reality import Reality, real_drives
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.stroke import within_stroke
 from tcrctl.robot import pose
@@ -47,6 +47,7 @@ class SimulatedPlant:
             NoEquilibriumError: If the robot has no stable shape.
         """
         robot = self.robot = moving_robot(settings, robot)
+        self._settings = settings
         self.period, self.time = period, 0.0
         self._pushes, self._dropouts = settings.pushes, settings.dropouts
         self._latency, self._noise = settings.latency_ms / 1000.0, settings.noise_um * 1e-6
@@ -71,7 +72,8 @@ class SimulatedPlant:
     @property
     def smooth(self) -> bool:
         """Whether :meth:`memory` is all that its next step depends on, and that step is a smooth map."""
-        return self.reality is None and self._body.state.slip is None
+        chosen = chooses_steps(self._settings)
+        return self.reality is None and self._body.state.slip is None and not chosen
 
     def start(self) -> None:
         """Do nothing: there is nothing to arm in simulation."""

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from tcrctl.elements import bar, rubbing_cable, sliding_cable
 from tcrctl.elements.rubbing_cable import Slip
 from tcrctl.numerics.generalized_alpha import coefficients
-from tcrctl.robot.equations import FORCE, Q_FREE, Load, Workspace, make_workspace
+from tcrctl.robot.equations import FORCE, Q_FREE, Load, Workspace
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import SIZE
 from tcrctl.robot.potential import Outcome, minimise
@@ -26,6 +27,10 @@ TOLERANCE = 1e-6
 MAX_ITERATIONS = 12
 #: An internal step is cut in half at most this often.
 MAX_HALVINGS = 8
+#: For the sake of precision it is cut at most this often.
+PRECISE_HALVINGS = 5
+#: A step is doubled again when its error is below this part of the bound: an error of third order grows eightfold.
+DOUBLED_BELOW = 0.1
 
 
 class State(NamedTuple):
@@ -54,16 +59,19 @@ class Rule(NamedTuple):
     Attributes:
         h: Largest internal step [s].
         rho: Spectral radius of (15).
+        bound: Largest error of an internal step [m], see :func:`error_share`; infinite: none is cut for it.
     """
 
     h: float
     rho: float
+    bound: float = np.inf
 
 
 class Scratch(NamedTuple):
     """Arrays of one internal step: predictors and the load of (*), and what one step leaves to the next.
 
-    ``settled`` is 1 if the last one converged: then the workspace belongs to ``q``, else 0.
+    ``settled`` is 1 if the last one converged: then the workspace belongs to ``q``, else 0. ``halvings`` is how
+    often the next one is cut in half.
     """
 
     q: Array
@@ -76,45 +84,12 @@ class Scratch(NamedTuple):
     cable_before: Array
     lead: Array
     settled: Array
+    halvings: NDArray[np.int64]
 
 
 def rest_state(q: Array, drive: Array, slip: Slip | None = None) -> State:
     """Make the state at rest in configuration ``q`` with ``drive``; copies both."""
     return State(q.copy(), np.zeros_like(q), np.zeros_like(q), np.zeros_like(q), drive.copy(), slip)
-
-
-def unworn(model: Model, q: Array, drive: Array, tension: Array, holes: Array) -> Slip:
-    """Return the slip of cables that lie in their holes without any friction force: one tension along each.
-
-    Args:
-        model: Robot arrays.
-        q: Node positions (3 n_nodes,) [m].
-        drive: Drive lengths (m,) [m].
-        tension: Tensions (m,) [N].
-        holes: Friction of every hole (n_holes, 3), columns as in ``elements.rubbing_cable``.
-    """
-    s = make_workspace(model, rubbing=True).stretches
-    assert s is not None
-    cables, first = model.cables, model.first_hole
-    rubbing_cable.measure(q, drive, first, model.hole_nodes, model.hole_weights, cables, s)
-    along = np.repeat(tension, np.diff(first))
-    ea = np.repeat(cables[:, sliding_cable.STIFFNESS] * cables[:, sliding_cable.REST], np.diff(first))
-    rest = s.length / (1.0 + along / ea)
-    slack = (
-        np.repeat(cables[:, sliding_cable.REST], np.diff(first))
-        * s.length
-        / np.repeat(np.add.reduceat(s.length, first[:-1]), np.diff(first))
-    )
-    rest = np.where(along > 0.0, rest, slack)
-    zeros = np.zeros_like(along)
-    return Slip(holes.copy(), ea / rest, rest, along, zeros, zeros.copy(), np.zeros(1))
-
-
-def lead_direction(q: Array) -> Array:
-    """Return the unit vector from the actuators to the base ring (3,): along the base's axis, towards the robot."""
-    r = q[:9].reshape(3, 3)
-    up = np.cross(r[1] - r[0], r[2] - r[0])
-    return np.asarray(-up / np.linalg.norm(up))
 
 
 def make_scratch(model: Model) -> Scratch:
@@ -133,6 +108,7 @@ def make_scratch(model: Model) -> Scratch:
         np.zeros(m),
         np.array([0.0, 0.0, -1.0]),
         np.zeros(1),
+        np.zeros(1, dtype=np.int64),
     )
 
 
@@ -211,12 +187,34 @@ def _finish_slip(model: Model, slip: Slip | None, s: Any) -> None:
         rubbing_cable.finish(slip, model.cables, model.first_hole, s)
 
 
+@njit(cache=True, error_model="numpy")
+def error_share(rho: float) -> float:
+    """Return the error of an internal step over the way from its predicted end, at constant q̈, to its end.
+
+    If q̈ changes linearly, by Δ, (12) ends β h² (1 - α_f) / (1 - α_m) Δ beside the prediction, and misses the true
+    end by h² (β - 1/6) Δ. Source: [ZX91] for Newmark's rule, whose a is q̈.
+    """
+    c = coefficients(rho, 1.0)
+    return abs(c.beta - 1.0 / 6.0) * (1.0 - c.alpha_m) / (c.beta * (1.0 - c.alpha_f))
+
+
 @njit(inline="always", error_model="numpy")  # compiled once, inside advance
 def try_step(
-    model: Model, x: State, speed: Array, h: float, rho: float, external: Array, ws: Workspace, s: Scratch
-) -> Outcome:
-    """Try one internal step of size ``h`` [s]; changes ``x`` only if it converges."""
-    c = coefficients(rho, h)
+    model: Model,
+    x: State,
+    speed: Array,
+    h: float,
+    rule: Rule,
+    external: Array,
+    ws: Workspace,
+    s: Scratch,
+) -> tuple[Outcome, float]:
+    """Try one internal step of size ``h`` [s]; changes ``x`` only if it converges, with an error within the bound.
+
+    Returns:
+        Its outcome, and its error [m].
+    """
+    c = coefficients(rule.rho, h)
     _bars_before(model, x.q, x.v, 0.5 * h, s)
     _begin_cables(model, x, speed, h, x.slip, ws.stretches, s, ws)
     inertia = c.acceleration + model.damping * c.velocity
@@ -231,8 +229,9 @@ def try_step(
         s.drive[i] = x.drive[i] + h * speed[i]
     load = Load(inertia, 2.0 / h, s.nodal, s.bar_before, s.cable_before, x.slip)
     outcome = minimise(model, s.q, s.drive, load, ws, TOLERANCE, np.int64(MAX_ITERATIONS), np.bool_(False))
-    s.settled[0] = 1.0 if outcome.converged else 0.0
-    if outcome.converged:
+    error = _error(rule.rho, s)
+    s.settled[0] = 1.0 if outcome.converged and error <= rule.bound else 0.0
+    if s.settled[0] == 1.0:
         _finish_slip(model, x.slip, ws.stretches)
         for k in range(x.q.shape[0]):
             moved = s.q[k] - s.q0[k]
@@ -244,7 +243,16 @@ def try_step(
             x.q[k] = s.q[k]
         for i in range(speed.shape[0]):
             x.drive[i] = s.drive[i]
-    return outcome
+    return outcome, error
+
+
+@njit(cache=True, error_model="numpy")
+def _error(rho: float, s: Scratch) -> float:
+    """Return the error of a step from the predicted s.q0 to s.q [m]."""
+    largest = 0.0
+    for k in range(s.q.shape[0]):
+        largest = max(largest, abs(s.q[k] - s.q0[k]))
+    return error_share(rho) * largest
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -276,19 +284,25 @@ def advance(
     done = 0.0
     residual = 0.0
     smallest = rule.h
-    halvings = 0
     iterations = 0
+    precise = rule.bound < np.inf
+    halvings = s.halvings[0] if precise else 0
     while done < duration * (1.0 - 1e-9):
         h = min(rule.h / 2.0**halvings, duration - done)
-        outcome = try_step(model, x, speed, h, rule.rho, external, ws, s)
+        if precise:  # equal steps to the end: a short last one would start the next ones with another error
+            h = (duration - done) / np.ceil((duration - done) / h - 1e-6)
+        bound = rule.bound if halvings < PRECISE_HALVINGS else np.inf
+        outcome, error = try_step(model, x, speed, h, Rule(rule.h, rule.rho, bound), external, ws, s)
         iterations += outcome.iterations
         residual = outcome.residual
-        if outcome.converged:
+        if s.settled[0] == 1.0:
             done += h
-            halvings = max(0, halvings - 1)
+            if error < DOUBLED_BELOW * rule.bound:
+                halvings = max(0, halvings - 1)
         else:
             halvings += 1
             if halvings > MAX_HALVINGS:
                 return False, residual, smallest, iterations
             smallest = min(smallest, rule.h / 2.0**halvings)
+    s.halvings[0] = halvings
     return True, residual, smallest, iterations

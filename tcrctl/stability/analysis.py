@@ -95,7 +95,8 @@ def analyse(
     if not plant.smooth:
         raise InputError(
             "the stability analysis needs a plant that can be linearised",
-            hint="Leave out plant.friction, drives, springs_hysteresis, cameras, realistic and the cables' creep.",
+            hint="Leave out plant.friction, drives, springs_hysteresis, cameras, realistic, the cables' creep, "
+            "and step_ms: auto.",
         )
     plant.without_noise()
     parts, _ = build_parts(experiment, plant, state)

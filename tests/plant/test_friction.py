@@ -8,10 +8,10 @@ import pytest
 from support import mechanics
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
-from tcrctl.robot import dynamics
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, assemble, make_workspace
 from tcrctl.robot.robot import hole_friction
 from tcrctl.robot.sections import FrictionSettings
+from tcrctl.robot.unworn import unworn
 from tcrctl.signals import Command
 
 PERIOD = 0.05
@@ -97,7 +97,7 @@ def rubbing_load(robot, q, drive, mu):
     """A time step of a robot that rubs, about to begin at ``q``, and its workspace."""
     model = robot.model
     holes = hole_friction(FrictionSettings(coefficient=mu), model.first_hole)
-    slip = dynamics.unworn(model, q, drive, robot.rest.tension, holes)
+    slip = unworn(model, q, drive, robot.rest.tension, holes)
     slip.rate[0] = 500.0
     slip.cap[:] = 0.05
     slip.before[:] = slip.tension / slip.stiffness

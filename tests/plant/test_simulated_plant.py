@@ -144,6 +144,25 @@ def test_truth_and_measurements_are_not_changed_by_later_steps(tcr5x4):
         assert np.array_equal(now, then)
 
 
+def test_chosen_steps_move_the_robot_as_fixed_ones_do(tcr5x4):
+    fixed, chosen = build(tcr5x4), build(tcr5x4, step_ms="auto")
+    for k in range(20):
+        fixed.write(command(fixed, k))
+        chosen.write(command(chosen, k))
+    assert 0.0 < np.abs(fixed.truth().q - chosen.truth().q).max() < 5e-6
+
+
+@pytest.mark.parametrize(
+    "effect", [{"friction": {"coefficient": 0.1}}, {"drives": {"lag_s": 0.05}}, {"cameras": {}}]
+)
+def test_what_is_not_ideal_goes_by_fixed_steps(tcr5x4, effect):
+    fixed, chosen = build(tcr5x4, **effect), build(tcr5x4, step_ms="auto", step_error_um=10.0, **effect)
+    for k in range(5):
+        fixed.write(command(fixed, k))
+        chosen.write(command(chosen, k))
+    assert np.array_equal(fixed.truth().q, chosen.truth().q)
+
+
 def test_a_plant_that_cannot_go_on_says_when_and_how_far_it_tried(tcr5x4):
     plant = build(tcr5x4)
     plant.write(command(plant, 3))

@@ -17,6 +17,7 @@ from tcrctl.robot.equations import FORCE, Q_FREE, Load, assemble, make_workspace
 from tcrctl.robot.equilibrium import equilibrium, static_load
 from tcrctl.robot.robot import hole_friction
 from tcrctl.robot.sections import FrictionSettings
+from tcrctl.robot.unworn import unworn
 
 ROBOTS = ["tcr600", "tcr700", "tcr5x4"]
 RHO = 0.8
@@ -307,7 +308,7 @@ def test_what_a_step_knows_of_the_last_one_changes_nothing(tcr5x4, rubs):
 
     def moved(fresh):
         holes = hole_friction(FrictionSettings(coefficient=0.1), model.first_hole)
-        slip = dynamics.unworn(model, tcr5x4.rest.q, still, tcr5x4.rest.tension, holes) if rubs else None
+        slip = unworn(model, tcr5x4.rest.q, still, tcr5x4.rest.tension, holes) if rubs else None
         state = dynamics.rest_state(tcr5x4.rest.q, still, slip)
         work, scratch = make_workspace(model, rubbing=rubs), dynamics.make_scratch(model)
         for k in range(40):

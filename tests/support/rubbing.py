@@ -6,8 +6,8 @@ import numpy as np
 
 from support import mechanics
 from tcrctl.elements import rubbing_cable
-from tcrctl.robot import dynamics
 from tcrctl.robot.equations import make_workspace
+from tcrctl.robot.unworn import unworn
 
 RINGS, SPACING, STIFFNESS, TENSION = 12, 0.05, 1500.0, 5.0
 #: Slips up to this are the rounding of lengths [m].
@@ -42,7 +42,7 @@ class Chain:
         self.model = mechanics.elements_only(rings, cables=[(holes, rest, STIFFNESS, damping, 0.1)])
         friction = np.tile([mu, least_wrap, drag], (rings + 1, 1))
         self.q, self.drive, self.work = q, np.zeros(1), 0.0
-        self.slip = dynamics.unworn(self.model, q, self.drive, np.array([tension]), friction)
+        self.slip = unworn(self.model, q, self.drive, np.array([tension]), friction)
         self.stretches = make_workspace(self.model, rubbing=True).stretches
         self.energy = self._energy()
 

@@ -25,6 +25,7 @@ from tcrctl.robot.equations import FORCE, Workspace, make_workspace
 from tcrctl.robot.equilibrium import equilibrium
 from tcrctl.robot.robot import Robot, hole_friction
 from tcrctl.robot.sections import FrictionSettings
+from tcrctl.robot.unworn import lead_direction, unworn
 from tcrctl.signals import Array
 
 #: Coefficients tried first, for all cables alike.
@@ -128,10 +129,10 @@ def _moving(
         coefficient=tuple(coefficient.tolist()), least_wrap_deg=settings.least_wrap_deg
     )
     holes = hole_friction(friction, robot.model.first_hole)
-    slip = dynamics.unworn(robot.model, q, drive, tension, holes)
+    slip = unworn(robot.model, q, drive, tension, holes)
     state = dynamics.rest_state(q, drive, slip)
     work, scratch = make_workspace(robot.model, rubbing=True), dynamics.make_scratch(robot.model)
-    scratch.lead[:] = dynamics.lead_direction(q)
+    scratch.lead[:] = lead_direction(q)
     work.tension[:] = tension
     return state, work, scratch
 
