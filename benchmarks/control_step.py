@@ -1,8 +1,9 @@
-"""Cost of one control step of tcr700 in pose mode: estimator and controller, section by section.
+"""Cost of one control step of tcr700 in pose mode: estimator and controller, section by section, and as it grows.
 
-    python benchmarks/control_step.py [--seconds 20]
+    python benchmarks/control_step.py [--seconds 20] [--modules 26]
 
-The robot follows a circle with a tilted end on the mismatched, noisy plant; times are of this process only.
+The robot follows a circle with a tilted end on the mismatched, noisy plant; times are CPU times of this thread. The
+same with more modules, cables to the last and to the ring at the same part of the length, tells how cost grows.
 """
 
 from __future__ import annotations
@@ -42,9 +43,22 @@ def circle(robot: Robot, t: Array) -> tuple[Array, Array]:
     return position, np.cos(tilt)[:, None] * [0.0, 0.0, 1.0] - np.sin(tilt)[:, None] * out
 
 
-def measure(seconds: float) -> tuple[Array, Array]:
+def stretched(count: int) -> Robot:
+    """Return tcr700 with so many modules."""
+    known = load_robot("tcr700")
+    longer = count / known.modules.count
+    routes = (r.model_copy(update={"to_ring": round(r.to_ring * longer)}) for r in known.cables.routes)
+    changes = {
+        "modules": known.modules.model_copy(update={"count": count}),
+        "cables": known.cables.model_copy(update={"routes": tuple(routes)}),
+        "tip": known.tip.model_copy(update={"ring": count}),
+        "stroke_mm": tuple(longer * end for end in known.stroke_mm),
+    }
+    return build_robot(known.model_copy(update=changes))
+
+
+def measure(robot: Robot, seconds: float) -> tuple[Array, Array]:
     """Return the times of estimator and controller [ms], one per step."""
-    robot = build_robot(load_robot("tcr700"))
     plant_settings = SimulatedSettings(
         kind="simulated",
         noise_um=50,
@@ -60,11 +74,11 @@ def measure(seconds: float) -> tuple[Array, Array]:
         measured, t = plant.read(), k * PERIOD
         position, normal = circle(robot, np.concatenate([[t], t + controller.ahead]))
         reference = Reference(t, position[0], normal[0], position[1:], normal[1:])
-        t0 = time.perf_counter()
+        t0 = time.thread_time()
         estimate = observer.update(measured, applied)
-        t1 = time.perf_counter()
+        t1 = time.thread_time()
         wanted, info = controller.control(estimate, reference)
-        times.append((t1 - t0, time.perf_counter() - t1))
+        times.append((t1 - t0, time.thread_time() - t1))
         assert info.converged, info.reason
         applied = plant.write(wanted)
     return 1e3 * np.array(times).T[:, 5:]
@@ -74,13 +88,22 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0, help="simulated time [s]")
-    estimate, control = measure(parser.parse_args().seconds)
-    table = Table("section", "p50 ms", "p99 ms", "max ms", title="control step, tcr700, pose, 20 Hz")
-    for name, values in (("estimator", estimate), ("controller", control), ("both", estimate + control)):
-        p50, p99 = np.percentile(values, [50, 99])
-        table.add_row(name, f"{p50:.2f}", f"{p99:.2f}", f"{values.max():.2f}")
+    parser.add_argument("--modules", type=int, default=26, help="modules of the other robot")
+    given = parser.parse_args()
+    robots = [build_robot(load_robot("tcr700")), stretched(given.modules)]
+    medians, table = (
+        [],
+        Table("modules", "section", "p50 ms", "p99 ms", "max ms", title="control step, pose, 20 Hz"),
+    )
+    for robot in robots:
+        estimate, control = measure(robot, given.seconds)
+        for name, values in (("estimator", estimate), ("controller", control), ("both", estimate + control)):
+            p50, p99 = np.percentile(values, [50, 99])
+            table.add_row(str(robot.n_modules), name, f"{p50:.3f}", f"{p99:.3f}", f"{values.max():.3f}")
+        medians.append(float(np.median(estimate + control)))
     console = Console()
     console.print(table)
+    console.print(f"{given.modules} / 13 modules: {medians[1] / medians[0]:.2f} (bar 2.2 for 26)")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     console.print(f"{estimate.shape[0]} steps, peak memory {peak:.0f} MiB")
 
