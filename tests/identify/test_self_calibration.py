@@ -138,6 +138,27 @@ def test_noisy_markers_give_values_within_their_deviations(body, drives):
     assert np.all(spread_of(body, fit) <= body.unknowns.prior * (1.0 + 1e-6))
 
 
+def test_markers_that_are_looser_than_assumed_give_wider_deviations(body, drives):
+    """Ten times the noise: values are still within their deviations, which would be ten times too small."""
+    x = drawn(body, seed=4)
+    fit = Calibrator(body, seen(body, drives, x, noise=200e-6), SPEC).fit()
+    off = (fit.x - x) / spread_of(body, fit)
+    assert fit.misfit > 20.0
+    assert np.sqrt(np.mean(off**2)) < 1.5
+    assert np.abs(off).max() < 5.0
+
+
+def test_rests_that_never_fit_do_not_drive_a_robot_away(body, drives):
+    """Two millimetres that nothing explains, at a robot unlike its file: a hundred times what is assumed."""
+    x = drawn(body, seed=6)
+    for name, value in (("springs", -0.3), ("density", 0.2), ("tension", -0.3)):
+        x[body.unknowns.of(name)] = value
+    fit = Calibrator(body, seen(body, drives, x, noise=2e-3), SPEC.model_copy(update={"iterations": 30})).fit()
+    off = (fit.x - x) / spread_of(body, fit)
+    assert np.abs(off[: body.unknowns.of("zeros").start]).max() < 3.0  # springs, density, tension
+    assert np.abs(fit.x / body.unknowns.prior).max() < 3.0
+
+
 def test_a_step_to_a_robot_without_a_stable_shape_is_halved(body, drives):
     """Cables so short that the robot tears: half of the way, or a quarter, leaves it whole."""
     calibrator, x = (

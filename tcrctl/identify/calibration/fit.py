@@ -4,6 +4,10 @@
 
 with L_k what one standard deviation of each loose quantity does at rest k, and weights w_k that fall for rests that
 fit much worse than the others (Student's distribution). The posterior covariance is (J'C^-1J + Λ^-1)^-1.
+
+Rests may be looser than assumed: C_k is taken s² times as large, s² the mean square of the whitened residuals, as
+long as that is above 1. So nothing far from the truth, where the shapes are not linear in the unknowns, outweighs
+what is known beforehand, and a robot that never fits as well as assumed is told with the certainty that it has.
 """
 
 from __future__ import annotations
@@ -43,7 +47,7 @@ class Fit:
         covariance: Of them (n, n).
         residual: Reported minus predicted markers (k, 3 n_markers) [m]; NaN where not seen.
         weight: Of every rest (k,).
-        misfit: Mean square of the whitened residuals; 1 if rests are as loose as assumed.
+        misfit: Weighted mean square of the whitened residuals; 1 if rests are as loose as assumed.
         iterations: Steps taken.
         converged: The last step was small.
     """
@@ -87,16 +91,17 @@ class Calibrator:
             weight = self._weights([residual for _, residual, _ in rows])
             J = np.vstack([np.sqrt(w) * slopes for w, (slopes, _, _) in zip(weight, rows, strict=True)])
             r = np.concatenate([np.sqrt(w) * res for w, (_, res, _) in zip(weight, rows, strict=True)])
-            information = J.T @ J + np.eye(prior.size)
+            looser = max(1.0, _mean_square(r))
+            information = J.T @ J / looser + np.eye(prior.size)
             told(k)
             if step < SMALL or k == self._spec.iterations:
                 break
-            move = np.linalg.solve(information, J.T @ r - x / prior)
+            move = np.linalg.solve(information, J.T @ r / looser - x / prior)
             step, k = float(np.abs(move).max()), k + 1
             x, rows = self._towards(x, prior * move * (LONGEST / max(step, LONGEST)))
         covariance = np.linalg.inv(information) * np.outer(prior, prior)
         residual = np.array([raw for _, _, raw in rows])
-        return Fit(x, covariance, residual, weight, float(r @ r / max(r.size, 1)), k, step < SMALL)
+        return Fit(x, covariance, residual, weight, _mean_square(r), k, step < SMALL)
 
     def _towards(self, x: Array, move: Array) -> tuple[Array, list[Row]]:
         """Go from unknowns x (n,) by as much of a move as leaves stable shapes everywhere; return the rows, too."""
@@ -134,9 +139,13 @@ class Calibrator:
     @staticmethod
     def _weights(residuals: list[Array]) -> Array:
         """Weights (k,) of rests with whitened residuals, by their size against that of the middle one."""
-        size = np.array([float(r @ r) / max(r.size, 1) for r in residuals])
+        size = np.array([_mean_square(r) for r in residuals])
         middle = max(float(np.median(size)), 1e-12)
         return np.asarray(np.minimum(1.0, (FREEDOM + 1.0) / (FREEDOM + size / middle)))
+
+
+def _mean_square(r: Array) -> float:
+    return float(r @ r) / max(r.size, 1)
 
 
 def spread(loose: Array, noise: float) -> Array:
