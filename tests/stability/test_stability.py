@@ -336,7 +336,9 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(
     assert said in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("effect", ["plant.friction.coefficient=0.1", "plant.drives.backlash_mm=0.2", "plant.step_ms=auto"])
+@pytest.mark.parametrize(
+    "effect", ["plant.friction.coefficient=0.1", "plant.drives.backlash_mm=0.2", "plant.step_ms=auto"]
+)
 def test_a_plant_that_cannot_be_linearised_is_refused(effect, capsys):
     assert main(["stability", "letter_t", "--set", effect, "--points", "1", "--quiet"]) == 2
     assert "can be linearised" in capsys.readouterr().err
