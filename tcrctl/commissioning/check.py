@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 
 from tcrctl.commissioning.picture import judged_picture
-from tcrctl.errors import DeviceError, InputError
+from tcrctl.errors import DeviceError, InputError, with_hint
 from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
 from tcrctl.plant.rig.devices import Cameras, Drives, DriveStatus, Sighting
 from tcrctl.plant.rig.file import LoadedRig
-from tcrctl.plant.rig.finding import NOT_READY, Finding, with_hint
+from tcrctl.plant.rig.finding import NOT_READY, Finding
 from tcrctl.plant.rig.mounting import CableAxis, cable_axes, mounting
 from tcrctl.plant.rig.own_limits import UNWATCHED, check_limits, check_load
 from tcrctl.plant.rig.settings import SafetyRules

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tcrctl.errors import DeviceError, InputError
+from tcrctl.errors import DeviceError, InputError, with_hint
 from tcrctl.plant.rig.assembly import connect_cameras, connect_drives
 from tcrctl.plant.rig.devices import DriveStatus
 from tcrctl.plant.rig.file import LoadedRig
-from tcrctl.plant.rig.finding import with_hint
 from tcrctl.plant.rig.mounting import NO_MARKERS
 
 FIRST_FRAME_S = 0.5

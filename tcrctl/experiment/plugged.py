@@ -16,7 +16,7 @@ from tcrctl.config.settings import Settings
 from tcrctl.config.strict_yaml import Document
 from tcrctl.config.unions import kind_of, models_in
 from tcrctl.controller.settings import OwnControllerSection
-from tcrctl.errors import InputError, Problem, TcrctlError
+from tcrctl.errors import InputError, Problem, TcrctlError, with_hint
 from tcrctl.estimator.section import EstimatorSection
 from tcrctl.log.file_names import PLUGINS, RESOLVED
 from tcrctl.plant.settings import PlantSection
@@ -72,7 +72,7 @@ def with_plugins(document: Document, model: type[Model], trust: Trust) -> tuple[
             find = partial(_file, document, section, trust)
             found = settings_of(section, kind, BASES[section], find)
         except InputError as error:
-            problems.append(document.problem((section, "kind"), f"{error} {error.hint}".strip()))
+            problems.append(document.problem((section, "kind"), with_hint(error)))
             continue
         if found is not None:
             fields[section] = found

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from tcrctl.config.strict_yaml import Document
-from tcrctl.errors import InputError, SpecError
+from tcrctl.errors import InputError, SpecError, with_hint
 from tcrctl.log.file_names import RESOLVED
 from tcrctl.plugins.source import function_in
 from tcrctl.trajectory.function_settings import FunctionSettings
@@ -43,7 +43,7 @@ def with_samples(document: Document, trajectory: Any) -> Any:
     except SpecError:
         raise
     except InputError as error:
-        document.refuse([(keys, f"{error} {error.hint}".strip())])
+        document.refuse([(keys, with_hint(error))])
     return found
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from tcrctl.config import shipped, strict_yaml
 from tcrctl.config.keys import Keys
 from tcrctl.config.strict_yaml import Document
-from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.errors import InputError, Problem, SpecError, with_hint
 from tcrctl.experiment.spec import LoadedSpec, load_spec
 from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.study.design import Cell
@@ -132,7 +132,7 @@ def checked(study: LoadedStudy) -> LoadedStudy:
         except InputError as error:
             if isinstance(error, SpecError):
                 raise
-            study.document.refuse([(("experiments", i), f"{error} {error.hint}".strip())])
+            study.document.refuse([(("experiments", i), with_hint(error))])
             raise
         if name in seen:
             study.document.refuse([(("experiments", i), f"is {name}, as {seen[name]} is")])

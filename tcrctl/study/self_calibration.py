@@ -18,7 +18,7 @@ from typing import Final
 
 import tcrctl.identify
 from tcrctl.config import strict_yaml
-from tcrctl.errors import InputError, SpecError, StoppedError
+from tcrctl.errors import InputError, SpecError, StoppedError, with_hint
 from tcrctl.estimator.calibration_settings import CalibrationSettings
 from tcrctl.estimator.settings import PassiveObserverSettings
 from tcrctl.experiment.prepare import prepare
@@ -124,7 +124,7 @@ def _excitation(study: LoadedStudy, name: str) -> LoadedSpec:
     except SpecError:
         raise
     except InputError as error:
-        study.document.refuse([(where, f"{error}. {error.hint}" if error.hint else str(error))])
+        study.document.refuse([(where, with_hint(error))])
         raise
     if given.spec.controller.kind != "open_loop":
         told = f"{name} is no excitation: its controller is {given.spec.controller.kind}, not open_loop"

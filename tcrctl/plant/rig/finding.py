@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
-from tcrctl.errors import TcrctlError
-
 #: Exit code of what must be put right before drives are armed.
 NOT_READY: Final = 4
 
@@ -29,11 +27,6 @@ class Finding:
     def as_json(self) -> dict[str, Any]:
         """Return the finding as an object."""
         return {**asdict(self), "ok": self.exit_code == 0}
-
-
-def with_hint(error: TcrctlError) -> str:
-    """Return what went wrong, and what can be done about it, for places that have one line."""
-    return f"{error}. {error.hint}" if error.hint else str(error)
 
 
 def worst(findings: Sequence[Finding]) -> int:

@@ -14,7 +14,7 @@ from tcrctl.config.keys import Keys
 from tcrctl.config.settings import Settings
 from tcrctl.config.strict_yaml import Document
 from tcrctl.config.unions import kind_of, models_in
-from tcrctl.errors import InputError, SpecError
+from tcrctl.errors import InputError, SpecError, with_hint
 from tcrctl.plant.rig.settings import CameraSection, DriveSection, MountedRobot, RigFile
 from tcrctl.plugins.groups import registered
 from tcrctl.plugins.origin import Origin
@@ -50,7 +50,7 @@ def with_devices(document: Document, trust: Trust) -> type[RigFile]:
         try:
             settings = settings_of(section, kind, BASES[section], trust.file)
         except InputError as error:
-            problems.append(document.problem((*keys, "kind"), f"{error} {error.hint}".strip()))
+            problems.append(document.problem((*keys, "kind"), with_hint(error)))
             continue
         if settings is not None and settings not in found[section]:
             found[section].append(settings)
