@@ -87,8 +87,8 @@ class LinkTimeoutError(LinkError):
         waited_s: How long was waited for this answer [s].
     """
 
-    def __init__(self, message: str, waited_s: float) -> None:
-        super().__init__(message)
+    def __init__(self, message: str, waited_s: float, *, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
         self.waited_s = waited_s
 
 

@@ -70,6 +70,7 @@ class ModbusLink:
         self._probe_address = probe_address
         self._client, self._dial = _client(link, timeout_s), dial
         self._unsure = False  # an answer may still be under way on a serial line
+        self._late = self._most_late = 0  # answers in a row that only patience has heard
 
     @property
     def connected(self) -> bool:
@@ -108,9 +109,16 @@ class ModbusLink:
             self._client.close()  # type: ignore[no-untyped-call]
 
     @contextmanager
-    def patience(self, timeout_s: float) -> Iterator[None]:
-        """Wait longer for answers where nothing moves yet; never shorter than set."""
+    def patience(self, timeout_s: float, most_late: int) -> Iterator[None]:
+        """Wait longer for answers where nothing moves yet; never shorter than set.
+
+        Args:
+            timeout_s: How long one answer may take [s].
+            most_late: So many in a row may come later than is set; the next one ends in `LinkTimeoutError`, because
+                who is always late would never be heard in motion.
+        """
         self._set_timeout(max(timeout_s, self._usual_timeout_s))
+        self._late, self._most_late = 0, most_late
         try:
             yield
         finally:
@@ -220,7 +228,19 @@ class ModbusLink:
             raise StaleAnswerError("function code", function, answered)
         if answer.isError():
             raise PlcExceptionError(int(getattr(answer, "exception_code", 0)), function, what)
+        self._count_late(time.monotonic() - began)
         return answer
+
+    def _count_late(self, waited: float) -> None:
+        """Lose patience with a PLC whose answers all take longer than one may once drives move."""
+        self._late = self._late + 1 if waited > self._usual_timeout_s else 0
+        if self._late > self._most_late and self._timeout_s > self._usual_timeout_s:
+            raise LinkTimeoutError(
+                f"the PLC at {self._link} answers after {1e3 * waited:.0f} ms, "
+                f"allowed are {1e3 * self._usual_timeout_s:.0f} ms",
+                waited,
+                hint="Its network, its scan time, another master? Or timeout_ms of the rig file is too short.",
+            )
 
 
 class PromptSerialClient(ModbusSerialClient):
