@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from tcrctl.errors import InputError, LogError
 from tcrctl.experiment.run_folder import make_folder_for
 from tcrctl.log.columns import COLUMNS
 from tcrctl.log.reader import Log, read_log
+from tcrctl.regular_file import other_kind
 from tcrctl.visible import cell
 
 #: Formats, which are also suffixes.
@@ -75,6 +76,8 @@ def export_log(
     """
     write = _parquet() if form == "parquet" else _FORMS[form]
     target, log = Path(out), read_log(path)
+    if kind := other_kind(target):
+        raise InputError(f"{target}: this is {kind}, not a file", hint="-o - is standard output, for --csv.")
     make_folder_for(target)
     if form in ARRAYS:
         arrays = _arrays(log)
@@ -88,6 +91,20 @@ def export_log(
     _write(target, write, steps, force)
     _write(beside, write, events, force)
     return Exported((target, beside), tuple(steps))
+
+
+def print_steps(
+    path: str | os.PathLike[str], stream: TextIO, *, nodes: bool = False, ahead: bool = False
+) -> None:
+    """Write the steps of a log as CSV to an open stream; see `export_log`.
+
+    Raises:
+        InputError: If ``path`` is not a log.
+        LogError: If the log is damaged.
+    """
+    _write_csv(
+        stream, table(read_log(path), nodes=nodes, ahead=ahead), "\n"
+    )  # streams spell the end of a line
 
 
 def _events(log: Log) -> dict[str, Series]:
@@ -134,8 +151,8 @@ def _exists(out: Path) -> InputError:
     return InputError(f"{out}: exists already", hint="Give another name with -o, or --force.")
 
 
-def _write_csv(stream: Any, content: Mapping[str, Series]) -> None:
-    writer = csv.writer(stream)
+def _write_csv(stream: Any, content: Mapping[str, Series], end: str = "\r\n") -> None:
+    writer = csv.writer(stream, lineterminator=end)
     writer.writerow(map(cell, content))
     writer.writerows(zip(*(_cells(series.values) for series in content.values()), strict=True))
 

@@ -17,6 +17,7 @@ from tcrctl.errors import DeviceError, InputError
 from tcrctl.experiment.run_folder import LATEST, SUMMARY
 from tcrctl.log.file_names import RESOLVED
 from tcrctl.log.run_files import json_of
+from tcrctl.regular_file import open_file
 
 TAGS: Final = "tags.json"
 
@@ -46,7 +47,8 @@ class FoundRun:
     def tags(self) -> tuple[str, ...]:
         """What the user has called it."""
         try:
-            return tuple(map(str, json.loads((self.folder / TAGS).read_text("utf-8"))))
+            with open_file(self.folder / TAGS) as file:
+                return tuple(map(str, json.loads(file.read(MAX_BYTES))))
         except (OSError, ValueError, TypeError, RecursionError):  # somebody else may have written it
             return ()
 
@@ -138,7 +140,9 @@ def unreadable(out: Path) -> list[Path]:
 def _summary(path: Path) -> Mapping[str, Any] | None:
     """Return what a file says as a map of JSON; None if it cannot be read, or is far too large for that."""
     try:
-        found = json_of(path.read_text("utf-8")) if path.stat().st_size <= MAX_BYTES else None
+        with open_file(path) as file:
+            content = file.read(MAX_BYTES + 1)
+        found = json_of(content.decode()) if len(content) <= MAX_BYTES else None
     except (OSError, ValueError):
         return None
     return found if isinstance(found, dict) else None

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -70,8 +69,13 @@ def export(
     log: LogFile,
     form: Form = Form(),
     out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", metavar="FILE", help="File to write; default: LOG with the new suffix."),
+        str | None,
+        typer.Option(
+            "-o",
+            "--out",
+            metavar="FILE",
+            help="File to write, - for standard output; default: LOG with the new suffix.",
+        ),
     ] = None,
     more: More = More(),
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
@@ -84,18 +88,25 @@ def export(
     """Write the steps of a log as CSV, Parquet, npz or mat; names end in the SI unit, e.g. estimate_position_x_m.
 
     The events go to a second table beside it, run.events.csv beside run.csv; in npz and mat they are arrays.
+    Standard output takes CSV, and of that the steps only.
 
     Examples:
       tcrctl export log.mcap --csv
       tcrctl export log.mcap --npz -o run.npz
+      tcrctl export log.mcap --csv -o - | head -2
       tcrctl export log.mcap --parquet --nodes
       tcrctl export --columns
     """
     del columns
-    from tcrctl.analysis.export import export_log
+    from tcrctl.analysis.export import export_log, print_steps
+    from tcrctl.errors import InputError
     from tcrctl.experiment.headline import count
 
     name = form.name
+    if out in ("-", "/dev/stdout"):
+        if name != "csv" or as_json:
+            raise InputError("-o -: standard output takes --csv, and nothing beside it")
+        return print_steps(log, sys.stdout, nodes=more.nodes, ahead=more.ahead)
     target = out or log.with_suffix(f".{name}")
     made = export_log(log, name, target, nodes=more.nodes, ahead=more.ahead, force=force)
     if as_json:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcrctl.cli.console import console, has_styles
-from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, SideBySide, to_make, unfolded
 from tcrctl.cli.progress import SpokenProgress
 
 if TYPE_CHECKING:
@@ -52,7 +52,9 @@ StrungBy = Annotated[
 Seed = Annotated[
     int | None, typer.Option("--seed", metavar="N", min=0, max=2**32 - 1, help="Seed of the swarm.")
 ]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where its folder is made.")]
+Out = Annotated[
+    Path, typer.Option("--out", metavar="DIR", parser=to_make, envvar=LOGS, help="Where its folder is made.")
+]
 
 
 Calibrate = Annotated[

@@ -6,6 +6,7 @@ import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import MISSING, dataclass, fields, is_dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_type_hints
 
 import typer
@@ -30,6 +31,19 @@ Quiet: TypeAlias = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print errors only; with --json the object too.")
 ]
 IsRobot: TypeAlias = Annotated[bool, typer.Option("--robot", help="Robot files instead of experiments.")]
+
+
+def to_make(name: str | Path) -> Path:
+    """Read an option that names a file or a folder to make.
+
+    Raises:
+        InputError: If it is ``-``, which stands for standard output elsewhere; ``./-`` is a file of that name.
+    """
+    from tcrctl.errors import InputError
+
+    if name == "-":
+        raise InputError("-: standard output cannot take this", hint="Give the name of a file or folder.")
+    return Path(name)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcrctl.cli.console import console, has_styles
-from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, to_make, unfolded
 from tcrctl.cli.table import print_facts, print_table
 
 if TYPE_CHECKING:
@@ -26,7 +26,12 @@ if TYPE_CHECKING:
 Out = Annotated[
     Path,
     typer.Option(
-        "--out", metavar="DIR", envvar=LOGS, help="Where the report's folder is made.", show_default=True
+        "--out",
+        metavar="DIR",
+        parser=to_make,
+        envvar=LOGS,
+        help="Where the report's folder is made.",
+        show_default=True,
     ),
 ]
 Only = Annotated[

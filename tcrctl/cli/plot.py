@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from tcrctl.cli.options import AsJson, unfolded
+from tcrctl.cli.options import AsJson, to_make, unfolded
 
 Logs = Annotated[
     list[Path], typer.Argument(metavar="LOG...", help="Logs of runs, or the folders of the runs.")
@@ -24,6 +24,7 @@ Out = Annotated[
     typer.Option(
         "--out",
         metavar="DIR",
+        parser=to_make,
         help="Where files are made; default: plots beside the log, ./plots for several logs.",
     ),
 ]

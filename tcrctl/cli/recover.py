@@ -10,14 +10,16 @@ from typing import Annotated
 import typer
 
 from tcrctl.cli.log_file import LogFile
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import AsJson, to_make
 
 
 def recover(
     log: LogFile,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", metavar="FILE", help="New file; default: LOG.recovered.mcap."),
+        typer.Option(
+            "-o", "--out", metavar="FILE", parser=to_make, help="New file; default: LOG.recovered.mcap."
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

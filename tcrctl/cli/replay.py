@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcrctl.cli.log_file import LogFile
-from tcrctl.cli.options import AsJson, Overrides, Quiet, unfolded
+from tcrctl.cli.options import AsJson, Overrides, Quiet, to_make, unfolded
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -31,11 +31,19 @@ Atol = Annotated[
 ]
 Rtol = Annotated[float, typer.Option("--rtol", min=0.0, help="Relative difference that counts as none.")]
 Out = Annotated[
-    Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write the replayed steps to a new log.")
+    Path | None,
+    typer.Option(
+        "-o", "--out", metavar="FILE", parser=to_make, help="Write the replayed steps to a new log."
+    ),
 ]
 Plot = Annotated[
     Path | None,
-    typer.Option("--plot", metavar="FILE", help="Draw recorded and replayed commands; .png, .pdf or .svg."),
+    typer.Option(
+        "--plot",
+        metavar="FILE",
+        parser=to_make,
+        help="Draw recorded and replayed commands; .png, .pdf or .svg.",
+    ),
 ]
 
 

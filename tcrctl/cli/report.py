@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tcrctl.cli.log_file import LogFiles
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import AsJson, to_make
 
 
 def report(
@@ -21,6 +21,7 @@ def report(
             "-o",
             "--out",
             metavar="FILE",
+            parser=to_make,
             help="File to write; default: report.html beside the log, in this folder for several logs.",
         ),
     ] = None,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, Spec, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, Spec, to_make, unfolded
 from tcrctl.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -28,7 +28,12 @@ RealTime = Annotated[bool, typer.Option("--realtime", help="Pace a simulated pla
 Out = Annotated[
     Path,
     typer.Option(
-        "--out", metavar="DIR", envvar=LOGS, help="Where the run's folder is made.", show_default=True
+        "--out",
+        metavar="DIR",
+        parser=to_make,
+        envvar=LOGS,
+        help="Where the run's folder is made.",
+        show_default=True,
     ),
 ]
 Seed = Annotated[

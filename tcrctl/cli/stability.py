@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import AsJson, Overrides, Quiet, Spec, unfolded
+from tcrctl.cli.options import AsJson, Overrides, Quiet, Spec, to_make, unfolded
 from tcrctl.cli.progress import progress_bar
 from tcrctl.visible import cell
 
@@ -25,10 +25,14 @@ Every = Annotated[
     int | None, typer.Option("--every", metavar="N", min=1, help="Every N-th control step instead.")
 ]
 Out = Annotated[
-    Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write all numbers to a .csv or .npz file.")
+    Path | None,
+    typer.Option(
+        "-o", "--out", metavar="FILE", parser=to_make, help="Write all numbers to a .csv or .npz file."
+    ),
 ]
 Figure = Annotated[
-    Path | None, typer.Option("--figure", metavar="FILE", help="Draw both curves: .png, .pdf or .svg.")
+    Path | None,
+    typer.Option("--figure", metavar="FILE", parser=to_make, help="Draw both curves: .png, .pdf or .svg."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
 

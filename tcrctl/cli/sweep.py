@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, to_make, unfolded
 from tcrctl.cli.progress import runs_bar
 
 if TYPE_CHECKING:
@@ -64,7 +64,10 @@ class Manner:
     logs: Annotated[str, typer.Option("--logs", help="Logs that are kept: all, failed or none.")] = "failed"
     retry: Annotated[bool, typer.Option("--retry", help="Do again what has no result.")] = False
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where the study's folder is.")
+        Path,
+        typer.Option(
+            "--out", metavar="DIR", parser=to_make, envvar=LOGS, help="Where the study's folder is."
+        ),
     ] = Path("logs")
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, to_make, unfolded
 from tcrctl.cli.progress import runs_bar
 
 if TYPE_CHECKING:
@@ -44,7 +44,10 @@ def tune(
     how: How = How(),
     side: SideBySide = SideBySide(),
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where the study's folder is.")
+        Path,
+        typer.Option(
+            "--out", metavar="DIR", parser=to_make, envvar=LOGS, help="Where the study's folder is."
+        ),
     ] = Path("logs"),
     quiet: Quiet = False,
     as_json: AsJson = False,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcrctl.cli.layout import message, width
-from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, unfolded
+from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, to_make, unfolded
 from tcrctl.experiment.headline import count
 
 if TYPE_CHECKING:
@@ -39,7 +39,8 @@ def workspace(
     reach: Reach = Reach(),
     side: SideBySide = SideBySide(),
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", envvar=LOGS, help="Where the folder is made.")
+        Path,
+        typer.Option("--out", metavar="DIR", parser=to_make, envvar=LOGS, help="Where the folder is made."),
     ] = Path("logs"),
     quiet: Quiet = False,
     as_json: AsJson = False,

@@ -14,6 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from tcrctl.errors import InputError, UnknownNameError
+from tcrctl.regular_file import open_file, other_kind
 
 _PACKAGE = Path(__file__).parents[1]
 _IDENTIFY = "identify_"
@@ -123,7 +124,7 @@ def _refuse_other_kinds(path: Path, wanted: str) -> None:
 
 def _begins(path: Path, mark: bytes) -> bool:
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             return file.read(len(mark)) == mark
     except OSError:  # whoever reads it says what is wrong
         return False
@@ -236,11 +237,9 @@ def is_path(name_or_path: str) -> bool:
 
 
 def _missing(path: Path) -> str:
-    try:
-        is_folder = path.is_dir()
-    except OSError:
-        is_folder = False
-    return "this is a folder, not a file, and not that of a run" if is_folder else "there is no such file"
+    if not (kind := other_kind(path)):
+        return "there is no such file"
+    return f"this is {kind}, not a file" + (", and not that of a run" if kind == "a folder" else "")
 
 
 def _file_here(name: str, folder: Path) -> str | None:

@@ -20,6 +20,7 @@ from tcrctl.config.budget import MAX_BYTES, MAX_DEPTH, MAX_PROBLEMS
 from tcrctl.config.keys import Finding, Keys, dotted
 from tcrctl.config.yaml_core import Builder, compose, dumps, position
 from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.regular_file import open_file
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -113,7 +114,7 @@ def read(path: str | Path) -> bytes:
         InputError: If it cannot be read, or is larger than any file of settings or measurements.
     """
     try:
-        with Path(path).open("rb") as file:
+        with open_file(path) as file:
             content = file.read(MAX_BYTES + 1)  # the size that a file tells may be wrong
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error

@@ -15,6 +15,7 @@ from tcrctl.errors import Problem, SpecError
 from tcrctl.identify.parameters import DEFAULT_FACTOR, Parameter, look_up, split, with_values
 from tcrctl.identify.settings import DataSettings, IdentificationSpec, ParameterSettings
 from tcrctl.identify.static_data import Configuration, read_static
+from tcrctl.regular_file import other_kind
 from tcrctl.robot.description import RobotDescription
 
 LOG_SUFFIX = ".mcap"
@@ -156,7 +157,8 @@ def _data(
     for i, entry in enumerate(spec.data):
         path = folder / Path(entry.file).expanduser()
         if not path.is_file():
-            problems.append(document.problem(("data", i, "file"), f"{path}: there is no such file"))
+            wrong = f"this is {kind}, not a file" if (kind := other_kind(path)) else "there is no such file"
+            problems.append(document.problem(("data", i, "file"), f"{path}: {wrong}"))
         elif path.suffix.lower() == LOG_SUFFIX:
             logs.append(LogSource(path, entry))
         else:

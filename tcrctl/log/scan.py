@@ -38,6 +38,7 @@ from tcrctl.errors import InputError, LogError
 from tcrctl.log.chunks import ChunkError, Expansion, TooLargeError
 from tcrctl.log.frames import HEAD, MAGIC, Frames, attachment_is_whole, parsed
 from tcrctl.log.seal import unsealed
+from tcrctl.regular_file import open_file
 
 _WANTED: Final = (Header, Schema, Channel, Message, Attachment, Metadata)
 #: No file has more findings than are worth telling.
@@ -73,7 +74,7 @@ class Scan:
         Raises:
             LogError: If chunks expand to more than they may.
         """
-        with open(self.path, "rb") as stream:
+        with open_file(self.path) as stream:
             frames = Frames(stream)
             expansion = Expansion(frames.size)
             opening = frames.bytes_at(0, len(MAGIC))
@@ -169,7 +170,7 @@ def check_is_mcap(path: Path) -> None:
         InputError: If it is not.
     """
     try:
-        with open(path, "rb") as stream:
+        with open_file(path) as stream:
             magic = stream.read(len(MAGIC))
             end = magic
             if len(magic) == len(MAGIC) and stream.seek(0, 2) > 2 * len(MAGIC):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from tcrctl.regular_file import open_file
 from tcrctl.study.plan import PlannedRun
 from tcrctl.study.row import loads
 from tcrctl.study.settings import EXPERIMENT
@@ -68,7 +69,8 @@ def estimate(runs: Sequence[PlannedRun], folder: Path, jobs: int) -> Estimate:
     """
     done, times = set[str](), dict[str, list[float]]()
     try:
-        lines = (folder / ROWS).read_bytes().splitlines(keepends=True)
+        with open_file(folder / ROWS) as file:
+            lines = file.readlines()
     except OSError:
         lines = []
     for row in map(loads, lines):

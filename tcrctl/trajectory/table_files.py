@@ -13,6 +13,7 @@ import numpy as np
 from tcrctl.config.budget import MAX_PROBLEMS
 from tcrctl.config.csv_table import CsvTable, number_in
 from tcrctl.errors import InputError, Problem, SpecError
+from tcrctl.regular_file import open_file
 from tcrctl.signals import Array
 from tcrctl.trajectory.samples import Columns
 
@@ -28,8 +29,8 @@ def read_bytes(path: Path) -> bytes:
         InputError: If it cannot be read, or is too large.
     """
     try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)  # the size that a file tells may be wrong: /dev/zero has none
+        with open_file(path) as file:
+            content = file.read(MAX_BYTES + 1)  # the size that a file tells may be wrong
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     if len(content) > MAX_BYTES:

@@ -13,6 +13,7 @@ from mcap.records import Channel, Message, Schema
 from tcrctl.errors import InputError, LogError, UnknownNameError
 from tcrctl.log.reader import read_log
 from tcrctl.log.scan import Scan
+from tcrctl.regular_file import open_file
 from tcrctl.view.server import ViewChannel
 
 STATIC: Final = "/scene/static"
@@ -80,7 +81,7 @@ class Tape:
         return self._indexed(begin_ns, self._topics) if self._complete else self._scanned(begin_ns)
 
     def _read_index(self) -> dict[str, ViewChannel]:
-        with open(self.path, "rb") as stream:
+        with open_file(self.path) as stream:
             summary = SeekingReader(stream).get_summary()
         statistics = None if summary is None else summary.statistics
         if summary is None or statistics is None or not statistics.message_count:
@@ -111,7 +112,7 @@ class Tape:
         return found
 
     def _indexed(self, begin_ns: int, topics: list[str]) -> Iterator[Sent]:
-        with open(self.path, "rb") as stream:
+        with open_file(self.path) as stream:
             try:
                 for _, channel, message in SeekingReader(stream).iter_messages(topics, starting_at=begin_ns):
                     yield Sent(message.log_time, channel.topic, message.data)

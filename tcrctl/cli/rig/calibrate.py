@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from tcrctl.cli.options import AsJson
+from tcrctl.cli.options import AsJson, to_make
 from tcrctl.cli.rig.options import Rig, Robot
 
 
@@ -21,7 +21,8 @@ def calibrate(
         bool, typer.Option("--free", help="Fit the vertical too; default: that of the levelled cameras.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write the rig file here instead.")
+        Path | None,
+        typer.Option("-o", "--out", metavar="FILE", parser=to_make, help="Write the rig file here instead."),
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the result, change no file.")] = False,
     as_json: AsJson = False,
