@@ -2,12 +2,13 @@
 
 A row stands on one line if it can. Where it cannot, cells wrap between words; where even that makes a row a tower,
 it is written as a paragraph instead: its first cell, and below it every other one with its title. Words are never
-broken. Without a width, which is what a pipe has, every row is one line, so that line-wise tools find all of it.
+broken; a checksum that is longer than a line is shortened. Without a width, which is what a pipe has, every row is one line, so that line-wise tools find all of it.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 import textwrap
 from collections.abc import Sequence
@@ -19,6 +20,8 @@ _NARROWEST: Final = 16
 #: A row of more lines is a tower; if so large a share of the rows are, all are written as paragraphs.
 _TALLEST: Final = 4
 _MANY: Final = 0.25
+#: A checksum, of which the beginning says as much to a reader; no other word is ever shortened.
+_DIGEST: Final = re.compile(r"[0-9a-f]{40,}")
 #: Columns of a terminal that does not say.
 _USUAL: Final = 80
 
@@ -68,6 +71,9 @@ def fact(name: str, text: str, at: int, columns: int | None) -> Lines:
     room = None if columns is None else columns - at
     if room is None or len(text) <= room:
         return [f"{name.ljust(at)}{text}".rstrip()]
+    if columns is not None and len(text) + len(_GAP) > columns and _DIGEST.fullmatch(text):
+        text = f"{text[:_NARROWEST]}..."  # all of it is in a wider terminal, a pipe, and JSON
+        return [f"{name.ljust(at)}{text}"] if len(text) <= room else [name, f"{_GAP}{text}"]
     if room < max(_NARROWEST, _longest_word(text)):
         return [name, *_words(text, max((columns or 0) - len(_GAP), 1), _GAP)]
     first, *more = _words(text, room)

@@ -44,7 +44,9 @@ class Look:
         """
         size, line = STYLES[self.style]
         if self.width_mm < _ONE_COLUMN:
-            size = max(_SMALLER * STYLES["paper"][0], min(_SMALLER * size, _PT_PER_MM * self.width_mm))
+            usual, (least, thinnest) = size, STYLES["paper"]
+            size = max(_SMALLER * least, min(_SMALLER * size, _PT_PER_MM * self.width_mm))
+            line = max(thinnest, line * size / usual)
         return {
             "axes.labelsize": size,
             "axes.linewidth": 0.67 * line,

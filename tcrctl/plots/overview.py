@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from tcrctl.analysis.history import History
@@ -16,10 +17,8 @@ from tcrctl.plots.space import draw_body, equal_scale
 
 def draw(histories: Sequence[History]) -> Figure:
     """Draw the robot of the first run in the middle of it, the paths of all runs [mm], and their errors."""
-    figure = style.new_figure(3.7)
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 2.2), height_ratios=(2.2, 1.0))
-    _body(figure.add_subplot(grid[:, 0], projection="3d"), histories)
-    drawing, below = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
+    figure, body, drawing, below = _panels()
+    _body(body, histories)
     draw_plan(drawing, histories)
     for i, history in enumerate(histories):
         below.plot(history.t, 1e3 * history.position_error, **style.line(i))
@@ -27,6 +26,20 @@ def draw(histories: Sequence[History]) -> Figure:
     style.span([below], histories)
     style.legend(figure, [drawing])
     return figure
+
+
+def _panels() -> tuple[Figure, Any, Any, Any]:
+    """Return a figure, and panels for robot, drawing and error: the robot beside the others, or above them."""
+    if style.is_narrow():
+        figure = style.new_figure(5.4)
+        grid = figure.add_gridspec(3, 1, height_ratios=(2.0, 2.2, 1.0))
+        robot, drawing, below = grid[0], grid[1], grid[2]
+    else:
+        figure = style.new_figure(3.7)
+        grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 2.2), height_ratios=(2.2, 1.0))
+        robot, drawing, below = grid[:, 0], grid[0, 1], grid[1, 1]
+    body = figure.add_subplot(robot, projection="3d")
+    return figure, body, figure.add_subplot(drawing), figure.add_subplot(below)
 
 
 def _body(axes: Any, histories: Sequence[History]) -> None:
@@ -41,7 +54,8 @@ def _body(axes: Any, histories: Sequence[History]) -> None:
         axes.plot(*path.T, **style.line(i))
     equal_scale(axes, shown, 10.0, zoom=1.2)
     axes.set(xticks=[], yticks=[], xlabel="x", ylabel="y", zlabel="z [mm]")
-    axes.xaxis.labelpad, axes.yaxis.labelpad, axes.zaxis.labelpad = -12, -12, 12
+    size = mpl.rcParams["font.size"]  # labels clear the numbers on the axis, and stay out of the panel below
+    axes.xaxis.labelpad, axes.yaxis.labelpad, axes.zaxis.labelpad = -1.4 * size, -1.4 * size, 2.0 * size - 6
     for artist in axes.lines:  # the box is larger than its place
         artist.set_clip_on(False)
         artist.set_in_layout(False)

@@ -185,6 +185,14 @@ def test_info_says_what_failed_right_after_the_status_to_four_digits(log, capsys
     assert lines[at + 1].split(None, 1)[1] == "FAILED: position_error_mm.max is 9.877 mm, must be <= 3 mm"
 
 
+@pytest.mark.parametrize(("columns", "whole"), [(40, False), (60, False), (80, True), (None, True)])
+def test_a_checksum_is_whole_or_says_that_it_is_not(columns, whole):
+    digest = "2bed6b9d" * 8
+    lines = fact("source_sha256", digest, 27, columns)
+    assert columns is None or max(map(len, lines)) <= columns
+    assert " ".join(lines).split() == ["source_sha256", digest if whole else f"{digest[:16]}..."]
+
+
 @pytest.mark.parametrize("columns", [60, 80, 120])
 def test_a_study_keeps_to_the_width_of_the_terminal(columns, tmp_path, capsys, monkeypatch):
     stay_here(monkeypatch)

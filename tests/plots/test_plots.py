@@ -358,6 +358,27 @@ def test_every_figure_is_laid_out_at_every_width(pose, several, width_mm, style)
                 draw(name, histories, look).draw_without_rendering()  # a warning is an error here
 
 
+@pytest.mark.parametrize("style", ["paper", "talk"])
+@pytest.mark.parametrize("width_mm", [40.0, 60.0, 88.0, 177.8])
+def test_the_robot_stands_beside_the_drawing_or_above_it_and_has_room(pose, width_mm, style):
+    look = Look(width_mm=width_mm, style=style)
+    with printed(look):
+        figure = draw("overview", pose, look)
+        figure.draw_without_rendering()
+    body, drawing, below = (panel.get_position() for panel in figure.axes)
+    beside = body.x1 <= drawing.x0
+    assert beside != (body.y0 >= drawing.y1)
+    width_in, height_in = figure.get_size_inches()
+    assert min(body.width * width_in, body.height * height_in) > 0.8
+    assert min(drawing.width, below.width) > 0.5
+
+
+def test_lines_of_a_narrow_figure_are_in_proportion_to_its_text():
+    for width_mm in (40.0, 60.0, 88.0, 177.8):
+        made = Look(width_mm=width_mm, style="talk").rc()
+        assert made["lines.linewidth"] / made["font.size"] == pytest.approx(2.2 / 14.0, abs=0.001)
+
+
 def test_a_figure_without_room_for_its_names_is_saved_without_a_word(several, tmp_path, recwarn):
     look = Look(width_mm=40.0)
     labelled = [dataclasses.replace(several[0], label=f"a run with a very long name {i}") for i in range(12)]
