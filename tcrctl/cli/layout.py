@@ -2,7 +2,8 @@
 
 A row stands on one line if it can. Where it cannot, cells wrap between words; where even that makes a row a tower,
 it is written as a paragraph instead: its first cell, and below it every other one with its title. Words are never
-broken; a checksum that is longer than a line is shortened. Without a width, which is what a pipe has, every row is one line, so that line-wise tools find all of it.
+broken; a checksum that is longer than a line is shortened. Without a width, which is what a pipe has, every row is
+one line, so that line-wise tools find all of it.
 """
 
 from __future__ import annotations
