@@ -35,6 +35,7 @@ class Receiver:
         self._inbox = inbox
         self._server = server
         self.foreign, self.senders = 0, Senders()
+        self._answering: Address | None = None  # some servers answer from another port than they are asked at
         session.last_problem = sockets.note
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="natnet", daemon=True)
@@ -110,7 +111,7 @@ class Receiver:
                 self.senders.object_to(sender, now)
             return False
         if not is_frame:
-            return True
+            return self._answers(sender, now)
         before = self.senders.first
         if not self.senders.admit(sender, now):
             self._session.last_problem = "a second source of frames, {}:{}".format(*sender)
@@ -118,6 +119,15 @@ class Receiver:
         if before not in (None, sender):
             self._session.begin_anew()
         return True
+
+    def _answers(self, sender: Address, now: float) -> bool:
+        """Tell whether the server itself says what is no frame: names and versions from elsewhere mix up markers."""
+        self._answering = self._answering or sender
+        if sender in (self._server, self._answering, self.senders.first):
+            return True
+        self.senders.object_to(sender, now)
+        self._session.last_problem = "a second server, {}:{}".format(*sender)
+        return False
 
     def _unreachable(self, error: OSError) -> None:
         self._session.last_problem = "{}:{}: {}".format(*self._server, error.strerror or error)

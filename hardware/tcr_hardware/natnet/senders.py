@@ -45,7 +45,7 @@ class Senders:
         return False
 
     def object_to(self, sender: Address, now: float) -> None:
-        """Note a frame of a stranger."""
+        """Note a frame of a stranger, or what only the server may say."""
         self.strangers += 1
         self._in_a_row = 1 if now - self._strange_at > LONGEST_DOUBT_S else self._in_a_row + 1
         self.stranger, self._strange_at = sender, now

@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 
+from support import natnet_wire as wire
 from tcr_hardware.emulators.motive import CLOCK_HZ, MotiveEmulator
 from tcr_hardware.emulators.motive_settings import MotiveSettings
 from tcr_hardware.errors import HardwareError, SocketError
@@ -406,6 +407,28 @@ def test_one_frame_of_another_computer_is_not_used_and_makes_the_others_doubtful
         eventually(lambda: not client.newest().doubt)
         assert client.newest().session == last.session
         assert client.statistics().strangers == 1
+
+
+@pytest.mark.parametrize("way", [WAYS[0], WAYS[2]])
+def test_names_from_another_program_of_the_servers_computer_are_not_believed(way):
+    """Whoever may rename markers can turn a robot round without a wrong frame."""
+    with linked(**way) as (motive, client):
+        frames(client, 2)
+        eventually(lambda: client.models is not None)
+        before = client.models.labels()
+        sockets = client._receiver._sockets
+        turned = wire.simple_models((4, 1), **{"m1": ["n2", "n3", "n1"], "m2": ["n1", "n2", "n3"]})
+        said = [wire.packet(5, turned), wire.packet(1, wire.server_info((2, 9))), wire.packet(9)]
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.bind(("127.0.0.1", 0))
+            for packet in said:
+                stranger.sendto(packet, ("127.0.0.1", sockets.command.getsockname()[1]))
+            eventually(lambda: client.statistics().strangers == len(said))
+        assert "a second server" in client.statistics().last_problem
+        assert client.newest().doubt
+        eventually(lambda: not client.newest().doubt)
+        assert client.models.labels() == before
+        assert frames(client, 2)
 
 
 def test_a_server_that_comes_back_at_another_port_is_followed():
