@@ -33,7 +33,7 @@ class MarkerMapError(HardwareError):
         shown = ", ".join(known[:12]) + (f" and {len(known) - 12} more" if len(known) > 12 else "")
         super().__init__(
             f"the camera system tracks no marker {', '.join(labels)}; it tracks: {shown or 'none'}",
-            hint="Labels are asset.marker, as in Motive's assets pane.",
+            hint="Labels are asset.marker, as in Motive's assets pane; one that two markers have is none.",
         )
         self.labels, self.known = tuple(labels), tuple(known)
 

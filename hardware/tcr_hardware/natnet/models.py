@@ -40,10 +40,11 @@ class ModelDefinitions:
         """Return the numbers of all markers by label ``asset.marker``.
 
         Names come from the asset itself or, before 4.0, from the marker set of the same name: a server lists
-        one for every asset. Markers without a name are called by their place: ``asset.1``.
+        one for every asset. Markers without a name are called by their place: ``asset.1``. A label
+        that two markers have says nothing about which is meant, so it is none.
         """
         sets = {each.name: each.markers for each in self.descriptions if each.kind == "marker_set"}
-        found: dict[str, int] = {}
+        found: dict[str, set[int]] = {}
         for asset in self.descriptions:
             others = sets.get(asset.name, ())
             markers = asset.markers
@@ -52,5 +53,5 @@ class ModelDefinitions:
             for k, (name, number) in enumerate(markers):
                 if number is not None:
                     other = others[k].name if len(others) == len(markers) else ""
-                    found[f"{asset.name}.{name or other or k + 1}"] = number
-        return found
+                    found.setdefault(f"{asset.name}.{name or other or k + 1}", set()).add(number)
+        return {label: numbers.pop() for label, numbers in found.items() if len(numbers) == 1}

@@ -121,7 +121,7 @@ class Receiver:
         return True
 
     def _answers(self, sender: Address, now: float) -> bool:
-        """Tell whether the server itself says what is no frame: names and versions from elsewhere mix up markers."""
+        """Tell whether the server itself says what is no frame: names from elsewhere mix up markers."""
         self._answering = self._answering or sender
         if sender in (self._server, self._answering, self.senders.first):
             return True

@@ -384,6 +384,24 @@ def test_labels_come_from_the_definitions_of_every_version(version):
 
 
 @pytest.mark.parametrize("version", VERSIONS)
+def test_a_label_that_two_markers_have_names_none(version):
+    """Which of them a rig file means cannot be told; the last one must not win."""
+    names, sets = ["n1", "n2", "n2"], [(0, wire.set_description("m1", ["n1", "n2", "n2"]))]
+    first, other = ((1, wire.body_description(version, name, 1, names)) for name in ("m1", "m2"))
+    again = (1, wire.body_description(version, "m1", 3, ["n1", "n2", "n3"]))
+    sets += [(0, wire.set_description("m2", names))]
+    once = decode_models(
+        wire.models_payload(version, [*sets, first, first, other]), Version(*version)
+    ).labels()
+    twice = decode_models(
+        wire.models_payload(version, [*sets, first, again, other]), Version(*version)
+    ).labels()
+    assert once["m1.n1"] == twice["m2.n1"] == 1 << 16 | 1
+    assert not {"m1.n2", "m2.n2"} & {*once}
+    assert "m1.n1" not in twice
+
+
+@pytest.mark.parametrize("version", VERSIONS)
 def test_definitions_cut_off_anywhere_are_refused(version):
     payload = every_description(version)
     for size in range(0, len(payload), 3):

@@ -412,7 +412,7 @@ def test_one_frame_of_another_computer_is_not_used_and_makes_the_others_doubtful
 @pytest.mark.parametrize("way", [WAYS[0], WAYS[2]])
 def test_names_from_another_program_of_the_servers_computer_are_not_believed(way):
     """Whoever may rename markers can turn a robot round without a wrong frame."""
-    with linked(**way) as (motive, client):
+    with linked(**way) as (_, client):
         frames(client, 2)
         eventually(lambda: client.models is not None)
         before = client.models.labels()
