@@ -81,6 +81,7 @@ class PlcBus:
         self._counters = Counters()
         self._liveness = Liveness()
         self._info: PlcInfo | None = None
+        self._wrote = False
         self._is_open = False  # stays so while a lost connection waits for its next attempt
         self.statistics = BusStatistics()
 
@@ -128,7 +129,7 @@ class PlcBus:
         codec = self._identify()
         self._blocks, self._liveness = Blocks(self._map, codec), Liveness()
         limits = self._blocks.limits(self._read("limits"))
-        self._counters = self._blocks.counters(self._read("command"))
+        self._counters, self._wrote = self._blocks.counters(self._read("command")), False
         status = self._status(self._read("status"), time.monotonic(), 1)
         return PlcInfo(MAP_VERSION, codec.word_order, codec.byte_order, limits, status)
 
@@ -215,6 +216,7 @@ class PlcBus:
     def _send(self, block: list[int]) -> list[int]:
         """Write the command block and read the status block."""
         address, (read_address, count) = self._map.span("command")[0], self._map.span("status")
+        self._wrote = True
         if self._one_request:
             try:
                 return self._link.read_write(read_address, count, address, block)
@@ -276,7 +278,7 @@ class PlcBus:
         for axis, (at, (lowest, highest)) in enumerate(zip(status.positions_um, strokes, strict=True), 1):
             if not 2 * lowest - highest <= at <= 2 * highest - lowest:  # a full stroke beyond the ends
                 raise ImplausibleAnswerError(axis, at, (lowest, highest))
-        self._liveness.check(status, self._counters.heartbeat, wrote=wrote)
+        self._liveness.check(status, self._counters.heartbeat if self._wrote else None, wrote=wrote)
         self.statistics.round_trip_s = status.round_trip_s
         self.statistics.rejects += status.reject is not Reject.NONE
         return status

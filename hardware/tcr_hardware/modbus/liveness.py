@@ -20,19 +20,19 @@ class Liveness:
         self._seen: dict[str, tuple[int, int, float]] = {}  # register -> value, repetitions, since when
         self._echo: int | None = None  # of the last answer; a PLC that was just connected may show any
 
-    def check(self, status: PlcStatus, heartbeat: int, *, wrote: bool) -> None:
+    def check(self, status: PlcStatus, heartbeat: int | None, *, wrote: bool) -> None:
         """Judge one answer.
 
         Args:
             status: The answer.
-            heartbeat: HEARTBEAT written last.
+            heartbeat: HEARTBEAT written last; None if we never wrote, and what is echoed is of others.
             wrote: Whether this exchange wrote; if not, only the scan counter has to move.
 
         Raises:
             StaleAnswerError: It is the answer of an earlier request.
             PlcFrozenError: A counter stands still.
         """
-        if self._echo not in (None, status.heartbeat_echo):
+        if heartbeat is not None and self._echo not in (None, status.heartbeat_echo):
             behind = (heartbeat - status.heartbeat_echo) & 0xFFFF
             if behind > ECHO_WINDOW or (status.heartbeat_echo - self._echo) & 0xFFFF > 0x8000:
                 raise StaleAnswerError("HB_ECHO", heartbeat, status.heartbeat_echo)

@@ -14,6 +14,8 @@ from tcr_hardware.errors import HardwareError
 from tcr_hardware.modbus.bus import PlcBus
 from tcr_hardware.modbus.errors import (
     ImplausibleAnswerError,
+    LinkLostError,
+    LinkTimeoutError,
     MapError,
     PlcFrozenError,
     PlcMismatchError,
@@ -219,7 +221,10 @@ class ModbusDrives:
         except PlcTakenError as error:
             raise ArmingRefusedError([f"{self._where}: {error}"], hint=error.hint) from error
         except HardwareError as error:
-            hint = emulate_hint(self._where) or error.hint
+            silent = isinstance(error, LinkLostError) or (
+                isinstance(error, LinkTimeoutError) and not error.hint
+            )
+            hint = (emulate_hint(self._where) if silent else "") or error.hint
             raise DeviceError(f"{self._where}: {error}", hint=hint) from error
 
     def _translated(self, answer: Any) -> DriveStatus:

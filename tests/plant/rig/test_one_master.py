@@ -15,7 +15,7 @@ from tcr_hardware.modbus.bus import PlcBus
 from tcr_hardware.modbus.errors import LinkError, PlcTakenError
 from tcr_hardware.modbus.registers import Control, Status
 from tcrctl.commissioning.jog import Jog, jog_rig
-from tcrctl.commissioning.zero import zero_rig
+from tcrctl.commissioning.zero import reset_rig, zero_rig
 from tcrctl.errors import ArmingRefusedError, DeviceError, NotArrivedError
 from tcrctl.plant.rig.modbus_drives import bus_settings
 from tcrctl.plant.rig.operation import Operation
@@ -103,6 +103,39 @@ def test_whoever_finds_the_drives_enabled_refuses_and_leaves_them_to_their_owner
     finally:
         plant.close()
     assert not enabled(bench)
+
+
+def test_whoever_only_looks_on_sees_a_running_robot_and_refuses_with_the_reason(bench):
+    """HEARTBEAT and its echo belong to the owner: they say nothing about answers to those who never wrote."""
+    plant = bench.plant()
+    running, owner = threading.Event(), []
+
+    def drive():
+        plant.start()
+        running.set()
+        loop = Loop(plant)
+        while running.is_set():
+            loop.run(0.05)
+        owner.append(plant.supervisor.state)
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    try:
+        assert running.wait(10.0)
+        with writer(bench) as watcher:
+            for _ in range(20):
+                assert Status.ENABLED in watcher.read_status().status
+                threading.Event().wait(0.03)
+            with pytest.raises(PlcTakenError, match="enabled"):
+                watcher.claim([0] * 6, 50_000)
+        with pytest.raises(ArmingRefusedError, match="enabled by somebody else"):
+            zero_rig(bench.loaded(), NAMES, AGREED, dry_run=False)
+        assert reset_rig(bench.loaded(), NAMES, AGREED, dry_run=False) == {"fault": None, "cleared": False}
+    finally:
+        running.clear()
+        thread.join()
+        plant.close()
+    assert owner == ["running"]
 
 
 def test_a_claim_over_which_somebody_writes_is_given_up(bench):
