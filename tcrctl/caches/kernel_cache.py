@@ -23,6 +23,7 @@ from numba.core.serialize import dumps
 
 from tcrctl.caches.kernel_folder import kernel_folder, used
 from tcrctl.caches.kernel_sources import kernel_sources
+from tcrctl.regular_file import open_file
 
 _DIGEST: Final = hashlib.sha256().digest_size
 
@@ -84,7 +85,8 @@ class KernelCache(FunctionCache):
 
     def _read(self, path: Path, key: Any, target_context: Any) -> Any:
         try:
-            content = path.read_bytes()
+            with open_file(path) as file:
+                content = file.read()
         except OSError:
             return None
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 
 import pytest
@@ -87,6 +88,16 @@ def test_a_damaged_file_is_dropped_and_made_again(warm, damage):
     assert COMPILING in said
     assert set(warm.kernels) == set(before)
     assert warm.lengths() == (found, "")
+
+
+def test_a_pipe_in_place_of_a_kernel_keeps_nobody_waiting(warm):
+    for path in warm.kernels:
+        path.unlink()
+        os.mkfifo(path)
+    found, said = warm.lengths()
+    assert found == pytest.approx([LENGTH])
+    assert COMPILING in said
+    assert all(path.is_file() for path in warm.kernels)
 
 
 @pytest.mark.parametrize("home", [None, "", "~", "relative", "a file"])
