@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any, Final
@@ -52,19 +53,30 @@ def compared(labels: Sequence[str], results: Sequence[Result]) -> str:
     rows = {"status": [badge(result) for result in results]}
     for i, result in enumerate(results):
         for line in headline(result):
-            rows.setdefault(line.name, ["–"] * len(results))[i] = escape(line.text)
+            rows.setdefault(line.name, ["–"] * len(results))[i] = _kept(escape(line.text))
         for judgement in judgements(result):
-            said = f'<span class="{judgement.style}">{escape(judgement.verdict)}</span> {escape(judgement.value)}'
+            verdict = f'<span class="{judgement.style}">{escape(judgement.verdict)}</span>'
+            said = f"{verdict} {_kept(escape(judgement.value))}"
             name = f"{judgement.name} {judgement.asked}"
             rows.setdefault(name, ["–"] * len(results))[i] = said
     head = "".join(
         f'<th><i class="run" data-run="{i}"></i>{escape(label)}</th>' for i, label in enumerate(labels)
     )
     body = "".join(
-        f"<tr><th>{escape(name)}</th>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+        f"<tr><th>{_breakable(name)}</th>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
         for name, cells in rows.items()
     )
     return f'<div class="wide"><table class="compared"><tr><th></th>{head}</tr>{body}</table></div>'
+
+
+def _kept(text: str) -> str:
+    """Keep units with their numbers."""
+    return re.sub(r"(?<=\d) (?=\S)", "&nbsp;", text)
+
+
+def _breakable(name: str) -> str:
+    """Write a name that may be broken between its parts, where columns are narrow."""
+    return escape(name).replace("_", "_<wbr>").replace(".", ".<wbr>")
 
 
 def task_table(result: Result) -> str:

@@ -324,7 +324,7 @@ def test_nothing_covers_anything_and_the_stage_is_in_view(page, tmp_path, size, 
     pairs = [(a, b) for i, a in enumerate(parts) for b in parts[:i] if overlap(found[a], found[b])]
     inside = [("play", "clock"), ("clock", "speed"), ("play", "speed")]
     assert pairs + [(a, b) for a, b in inside if overlap(found[a], found[b])] == []
-    assert found["unnamed"] == 0
+    assert (found["unnamed"], found["torn"], found["hidden"]) == (0, [], 0)
     if size == (1400, 900):
         assert found["player"]["bottom"] <= found["height"]
         assert found["robot"]["bottom"] - found["robot"]["top"] >= 300
