@@ -43,7 +43,7 @@ def payload(histories: Sequence[History], results: Sequence[Result]) -> dict[str
     return {
         "begin": min(float(history.t[0]) for history in histories),
         "end": max(float(history.t[-1]) for history in histories),
-        "open": _opening(histories[0], results[0]),
+        "open": _opening(histories, results),
         "plane": {
             "right": plane.right.tolist(),
             "up": plane.up.tolist(),
@@ -59,15 +59,15 @@ def payload(histories: Sequence[History], results: Sequence[Result]) -> dict[str
     }
 
 
-def _opening(history: History, result: Result) -> float:
-    """Return the time at which the page opens: the stop, the last thing that the task was about, or the end."""
-    if result.get("status") in FINISHED:
-        told = [
-            e.t for e in history.log.events() if e.kind == "task" and history.t[0] <= e.t <= history.t[-1]
-        ]
-        if told:
-            return max(told)
-    return float(history.t[-1])
+def _opening(histories: Sequence[History], results: Sequence[Result]) -> float:
+    """Return the time at which the page opens: the first stop, what the first task ended with, or the end."""
+    runs = zip(histories, results, strict=True)
+    stops = [float(history.t[-1]) for history, result in runs if result.get("status") not in FINISHED]
+    if stops:
+        return min(stops)
+    first = histories[0]
+    told = [e.t for e in first.log.events() if e.kind == "task" and first.t[0] <= e.t <= first.t[-1]]
+    return float(max(told, default=first.t[-1]))
 
 
 def _run(history: History, drawing: Drawing, result: Result) -> dict[str, Any]:

@@ -173,6 +173,22 @@ def test_of_several_runs_it_is_said_which_was_stopped(tmp_path):
     assert re.findall(r'<p class="reason"><b>(.+?)</b> ', text) == ["one &amp; all", "other"]
 
 
+def test_a_page_opens_where_the_first_of_its_runs_was_stopped(tmp_path):
+    ends = {
+        "whole": ({"status": "success"}, 60),
+        "late": ({"status": "aborted"}, 50),
+        "early": ({"status": "error"}, 30),
+    }
+    logs = {
+        name: write(tmp_path / f"{name}.mcap", stop={"reason": "", **stop}, steps=range(n))
+        for name, (stop, n) in ends.items()
+    }
+    for names, opens in (("whole",), 59), (("whole", "late"), 49), (("late", "whole", "early"), 29):
+        page = write_report([logs[name] for name in names], tmp_path / f"{len(names)}.html", labels=names)
+        found = re.search(r'"open": ?([\d.]+)', page.read_text())
+        assert float(found[1]) == pytest.approx(opens * records.PERIOD_S)
+
+
 def test_thinning_out_keeps_every_peak_and_mark():
     rng = np.random.default_rng(0)
     n = 5 * packing.MOST_POINTS + 123
