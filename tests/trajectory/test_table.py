@@ -20,7 +20,7 @@ from tcrctl.log.reader import read_log
 from tcrctl.replay.replay import replay
 from tcrctl.robot.robot import build_robot
 from tcrctl.trajectory.table import build_table
-from tcrctl.trajectory.table_files import MAX_NUMBERS, read_bytes
+from tcrctl.trajectory.table_files import MAX_BYTES, MAX_NUMBERS, read_bytes
 from tcrctl.trajectory.table_settings import TableSettings
 
 REST = np.array([0.0, 0.0, -0.6])
@@ -195,8 +195,16 @@ def test_a_small_file_that_expands_to_a_large_one_is_refused_before_it_does(form
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="has no file without an end")
 def test_a_file_without_an_end_is_refused():
-    with pytest.raises(InputError, match="larger than 64 MiB"):
+    with pytest.raises(InputError, match="this is a device, not a file"):
         read_bytes(Path("/dev/zero"))
+
+
+def test_a_file_that_is_larger_than_any_table_is_refused(tmp_path):
+    large = tmp_path / "path.csv"
+    with large.open("wb") as file:
+        file.truncate(MAX_BYTES + 1)
+    with pytest.raises(InputError, match="larger than 64 MiB"):
+        read_bytes(large)
 
 
 def test_samples_that_need_too_much_acceleration_are_refused_with_their_time():
