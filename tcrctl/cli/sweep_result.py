@@ -61,7 +61,7 @@ def show(study: LoadedStudy, result: Done, found: Findings, out: Path, shape: Sh
         for text in found.tables(brief=True):
             print_table(text.head, text.rows)
         ended = len(result.runs) - result.missing
-        print(f"{ended} of {len(result.runs)} runs, {result.new} of them now: {folder}")
+        print(f"{ended} of {count(len(result.runs), 'run')}, {result.new} of them now: {folder}")
 
 
 def _say_why(result: Done) -> str:

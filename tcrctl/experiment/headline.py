@@ -75,9 +75,10 @@ def count(how_many: int, noun: str) -> str:
 
     Args:
         how_many: The number.
-        noun: What is counted, one of them; its plural ends in s.
+        noun: What is counted, one of them; its plural ends in s or es.
     """
-    return f"{how_many} {noun}{'' if how_many == 1 else 's'}"
+    ending = "es" if noun.endswith("s") else "s"
+    return f"{how_many} {noun}{'' if how_many == 1 else ending}"
 
 
 def numbers(found: Mapping[str, float] | None, unit: str) -> str:
@@ -119,6 +120,6 @@ def _parts(key: str, value: Any, result: Mapping[str, Any]) -> Mapping[str, str]
     return {part: number(found, UNITS.get(f"{key}.{part}", "")) for part, found in value.items()}
 
 
-def _overruns(count: int, share: float) -> str:
-    text = f"{count} steps, {100.0 * share:.3g} %, began or took longer than a period too late"
+def _overruns(late: int, share: float) -> str:
+    text = f"{count(late, 'step')}, {100.0 * share:.3g} %, began or took longer than a period too late"
     return f"{text}: this computer does not keep up" if share >= _MANY else text

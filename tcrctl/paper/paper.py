@@ -13,6 +13,7 @@ from typing import Any, Final
 from tcrctl.errors import DeviceError, RunInterruptedError, UnknownNameError
 from tcrctl.executors.engine import Engine
 from tcrctl.executors.outcomes import Crash, outcomes
+from tcrctl.experiment.headline import count
 from tcrctl.experiment.provenance import versions
 from tcrctl.experiment.run_folder import RunFolder, make_run_folder
 from tcrctl.loop.interruption import Interruption
@@ -87,7 +88,7 @@ class Report:
             f"{met} of {len(verdicts)} bars met{left}; {goals} goals met too."
             if verdicts
             else "No bars here.",
-            f"Made by `{self.command}` in {self.seconds:.0f} s with {self.workers} processes.",
+            f"Made by `{self.command}` in {self.seconds:.0f} s with {count(self.workers, 'process')}.",
         ]
         if self.load > BUSY * self.cores:
             busy = f"load {self.load:.1f} on {self.cores} cores"

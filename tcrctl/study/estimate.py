@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from tcrctl.experiment.headline import count
 from tcrctl.regular_file import open_file
 from tcrctl.study.plan import PlannedRun
 from tcrctl.study.row import loads
@@ -56,7 +57,7 @@ class Estimate:
     def sentence(self) -> str:
         """How many runs there are, and how long they may take."""
         took = "not timed yet" if self.seconds is None else f"about {self.seconds:.0f} s"
-        return f"{len(self.runs)} runs, {self.missing} of them to be done: {took}"
+        return f"{count(len(self.runs), 'run')}, {self.missing} of them to be done: {took}"
 
 
 def estimate(runs: Sequence[PlannedRun], folder: Path, jobs: int) -> Estimate:

@@ -12,6 +12,7 @@ from support import records
 from support.log_files import open_log
 from tcrctl.cli.app import main
 from tcrctl.config import shipped
+from tcrctl.experiment.headline import count, headline
 from tcrctl.plant.rig.loopback import emulate_hint
 from tcrctl.robot.description import load_robot
 from tcrctl.robot.doubts import doubts
@@ -163,3 +164,18 @@ def test_no_columns_are_unknown_columns(columns, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", columns)
     assert main(["export", "--columns"]) == 0
     assert "estimate_position" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("noun", "one", "several"), [("run", "1 run", "0 runs"), ("process", "1 process", "0 processes")]
+)
+def test_one_thing_is_told_in_the_singular(noun, one, several):
+    assert (count(1, noun), count(0, noun)) == (one, several)
+
+
+def test_one_late_step_and_a_study_of_one_run_are_told_in_the_singular(here, capsys):
+    line = next(line for line in headline({"overruns": 1, "steps": 200}) if line.name == "overruns")
+    assert line.text.startswith("1 step, 0.5 %")
+    code, printed = said(capsys, "sweep", "letter_t", "--seeds", "0..0", "--dry-run")
+    assert code == 0
+    assert "1 run, 1 of them to be done" in printed.out + printed.err
