@@ -269,6 +269,8 @@ def _find(kind: str, name_or_path: str, shipped: Mapping[str, Path], folder: Pat
         if not _is_file(path):
             raise InputError(f"{path}: {_missing(path)}")
         return path
+    if name_or_path == "-":
+        raise InputError("-: standard input is not read", hint="Give the name of a file.")
     if name_or_path not in shipped:
         error = UnknownNameError(kind, name_or_path, list(shipped))
         here = _file_here(name_or_path, folder)

@@ -76,6 +76,12 @@ def test_a_verb_says_what_it_is_and_waits_for_nothing(verb, kind, capsys):
     assert said.count("\n") == 1
 
 
+@pytest.mark.parametrize("verb", [verb for verb in SPECS if verb != ("emulate", "--faults")], ids=" ".join)
+def test_standard_input_is_refused_with_a_sentence(verb, capsys):
+    assert main([*verb, "-"]) == 2
+    assert "standard input is not read" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("entry", ["summary.json", "tags.json"])
 def test_a_pipe_in_the_folder_of_a_run_does_not_keep_the_list_of_runs(entry, here, capsys):
     run = here / "logs" / "a_run"
