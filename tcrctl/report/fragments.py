@@ -113,11 +113,11 @@ def _further(result: Result) -> str:
 
 def _criteria(result: Result) -> str:
     rows = [
-        f'<tr><td class="{j.style}">{escape(j.verdict)}</td><td><code>{escape(j.name)}</code></td>'
+        f'<tr><td class="{j.style}">{escape(j.verdict)}</td><td><code>{_breakable(j.name)}</code></td>'
         f"<td>{escape(j.value)}</td><td>{escape(j.asked)}</td></tr>"
         for j in judgements(result)
     ]
-    return _table(("verdict", "criterion", "value", "must be"), rows)
+    return _table(("verdict", "criterion", "value", "must be"), rows, "criteria")
 
 
 def _events(history: History) -> str:
@@ -130,11 +130,11 @@ def _events(history: History) -> str:
     return _table(("time", "level", "kind", "what happened"), rows)
 
 
-def _table(titles: Sequence[str], rows: Sequence[str]) -> str:
+def _table(titles: Sequence[str], rows: Sequence[str], kind: str = "") -> str:
     if not rows:
         return "<p>None.</p>"
     head = "".join(f"<th>{title}</th>" for title in titles)
-    return f'<div class="wide"><table><tr>{head}</tr>{"".join(rows)}</table></div>'
+    return f'<div class="wide"><table class="{kind}"><tr>{head}</tr>{"".join(rows)}</table></div>'
 
 
 def pairs(values: Mapping[str, str]) -> str:

@@ -47,6 +47,14 @@ SUMMARY = {
             "passed": False,
         },
         {"name": "tension_n.min", "limit": 0.5, "value": None, "unit": "N", "passed": False},
+        {
+            "name": "theta_x_error_rad.max",
+            "relation": "<=",
+            "limit": 0.035,
+            "value": 0.001864,
+            "unit": "rad",
+            "passed": True,
+        },
     ],
     "task": {"targets": [{"position_error_mm": 0.5, "beam_passes": True}], EVIL: EVIL},
 }
