@@ -9,7 +9,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -241,6 +241,7 @@ def _drive(run: _Run, log: LogWriter) -> TcrctlError | None:
             run_loop(run.parts)
     except TcrctlError as error:
         failure = _in_mid_run(error) if started else error
+        _note_stall(run.parts, log)
     finally:
         run.parts.pace.end()
         try:
@@ -248,6 +249,15 @@ def _drive(run: _Run, log: LogWriter) -> TcrctlError | None:
         except TcrctlError as error:  # what ended the run first is the reason
             failure = failure or error
     return failure
+
+
+def _note_stall(parts: Parts, log: LogWriter) -> None:
+    """Say how long the step has kept the run in which it ended: of all steps it alone is not recorded."""
+    behind = parts.pace.behind()
+    if behind > parts.period:
+        with suppress(LogError):  # a log that cannot be written to is told elsewhere
+            text = f"the run ended {behind:.3f} s after its last step was due"
+            log.event(parts.pace.moment(), "late", "warning", text)
 
 
 def _in_mid_run(error: TcrctlError) -> TcrctlError:

@@ -37,6 +37,10 @@ class Pace(Protocol):
         """Return how long ago the first step began [s], missed steps counted: what waits, waits by this time."""
         ...
 
+    def behind(self) -> float:
+        """Return how long ago the step that is due now should have begun [s]; not more than 0 if it is not late."""
+        ...
+
     def end(self) -> None:
         """Note that no further step will come."""
         ...
@@ -70,6 +74,10 @@ class Unpaced:
     def elapsed(self) -> float:
         """Return the time of the last step [s]."""
         return self._time
+
+    def behind(self) -> float:
+        """Return 0: no step is ever late."""
+        return 0.0
 
     def end(self) -> None:
         """Do nothing: time goes by steps alone."""
@@ -108,7 +116,7 @@ class RealTime:
         self._clock = clock
         self._sleep = sleep
         self._start: float | None = None
-        self._first, self._due, self._ended = 0.0, 0.0, False
+        self._first, self._due, self._should, self._ended = 0.0, 0.0, 0.0, False
 
     def wait(self, t: float) -> float:
         """Wait until the start plus ``t``; return the lateness [s]."""
@@ -117,6 +125,7 @@ class RealTime:
         if self._start is None:
             self._first = self._clock()
             self._start = self._first - t
+        self._should = self._start + t
         while (left := self._start + t - self._clock()) > 0.0:
             self._sleep(min(left, LONGEST_NAP))
             self._check()
@@ -144,6 +153,10 @@ class RealTime:
     def elapsed(self) -> float:
         """Return the time since the first step began [s]; 0 before it."""
         return 0.0 if self._start is None else self._clock() - self._first
+
+    def behind(self) -> float:
+        """Return the time since the step that is due now should have begun [s], its own lateness counted."""
+        return 0.0 if self._start is None else self._clock() - self._should
 
     def end(self) -> None:
         """Note that no further step will come."""

@@ -91,8 +91,24 @@ def test_the_time_of_events_never_goes_back_and_lies_between_two_steps_until_the
     assert pace.moment() >= seen[-1] + 1.0
 
 
+def test_how_far_a_run_is_behind_counts_what_the_step_was_late_and_what_it_takes():
+    clock = Clock()
+    pace = RealTime(PERIOD, clock=clock, sleep=clock.sleep)
+    assert pace.behind() == 0.0
+    pace.wait(0.0)
+    clock.now += 0.3 * PERIOD
+    assert pace.behind() == pytest.approx(0.3 * PERIOD)
+    pace.wait(PERIOD)
+    assert pace.behind() == pytest.approx(0.0, abs=1e-9)
+    clock.now += 3.0
+    pace.wait(2 * PERIOD)  # begins late
+    clock.now += 0.5
+    assert pace.behind() == pytest.approx(3.5 - PERIOD)
+
+
 def test_a_run_that_no_clock_paces_has_no_time_but_that_of_its_steps():
     pace = Unpaced()
     pace.wait(3.0)
     pace.end()
     assert pace.moment() == pace.time() == 3.0
+    assert pace.behind() == 0.0

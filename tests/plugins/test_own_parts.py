@@ -220,6 +220,21 @@ def test_a_part_that_fails_in_mid_run_is_a_safe_stop_with_a_finished_log(own, na
     assert read_log(summary.log).complete
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("stalled_s", [0.0, 0.4])
+def test_a_step_that_stalled_and_ended_the_run_is_not_recorded_but_told(own, stalled_s):
+    """Its lateness and time are in no step, so an event has to say where they went."""
+    stall = f"self.write = lambda c: (__import__('time').sleep({stalled_s}), 1 / 0)"
+    summary = run_experiment(
+        prepare(own(OWN_PLANT, old=READ, new=f"{READ}; {stall}")), out=Path("runs"), realtime=True
+    )
+    told = [event for event in read_log(summary.log).events() if event.kind == "late"]
+    behind = [float(event.message.split()[3]) for event in told]
+    assert summary.exit_code == 4
+    assert [s for s in behind if s > 0.35] == (behind if stalled_s else [])
+    assert len(behind) == 1 or not stalled_s
+
+
 UNREADABLE = {
     "raises": ("self.read = lambda: 1 / 0", "read raised ZeroDivisionError"),
     "double precision": (
