@@ -236,7 +236,7 @@ class ModbusLink:
         self._late = self._late + 1 if waited > self._usual_timeout_s else 0
         if self._late > self._most_late and self._timeout_s > self._usual_timeout_s:
             raise LinkTimeoutError(
-                f"the PLC at {self._link} answers after {1e3 * waited:.0f} ms, "
+                f"answers of the PLC come after {1e3 * waited:.0f} ms, "
                 f"allowed are {1e3 * self._usual_timeout_s:.0f} ms",
                 waited,
                 hint="Its network, its scan time, another master? Or timeout_ms of the rig file is too short.",
