@@ -153,7 +153,9 @@ def test_rests_that_never_fit_do_not_drive_a_robot_away(body, drives):
     x = drawn(body, seed=6)
     for name, value in (("springs", -0.3), ("density", 0.2), ("tension", -0.3)):
         x[body.unknowns.of(name)] = value
-    fit = Calibrator(body, seen(body, drives, x, noise=2e-3), SPEC.model_copy(update={"iterations": 30})).fit()
+    fit = Calibrator(
+        body, seen(body, drives, x, noise=2e-3), SPEC.model_copy(update={"iterations": 30})
+    ).fit()
     off = (fit.x - x) / spread_of(body, fit)
     assert np.abs(off[: body.unknowns.of("zeros").start]).max() < 3.0  # springs, density, tension
     assert np.abs(fit.x / body.unknowns.prior).max() < 3.0
