@@ -20,7 +20,7 @@ PACKAGE: Final = Path(__file__).parents[1]
 FOLDERS: Final = (
     "controller", "elements", "estimator", "numerics", "picture", "plant", "robot", "task", "trajectory",
 )  # fmt: skip
-_KERNEL: Final = b"njit"
+_KERNEL: Final = b"numerics.kernel import"
 _SETTINGS: Final = (b"tcrctl.config", b"pydantic")
 _IMPORT: Final = re.compile(
     rb"^[ \t]*(?:from[ \t]+(tcrctl[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+(tcrctl[\w.]*))",

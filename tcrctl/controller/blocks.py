@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
 
@@ -42,7 +42,7 @@ def block_edges(instants: int, blocks: int) -> Array:
     return np.array([*edges, instants], dtype=np.int64)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def superpose(change: Array, now: Array, edges: Array) -> tuple[Array, Array]:
     """Find outputs for piecewise constant speeds from the responses to ramps that begin now.
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import kernel
 from tcrctl.robot import pose
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.signals import Array
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def fill_target(poses: Array, shift: Array, tension: float, m: int) -> Array:
     """Return the target of ``cost.make_target`` for poses now and at the instants (n + 1, 6), and a tension [N]."""
     target = np.zeros((poses.shape[0] - 1, POSE_ROWS + m))
@@ -22,7 +22,7 @@ def fill_target(poses: Array, shift: Array, tension: float, m: int) -> Array:
     return target
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def limits(
     drive: Array, limit: float, shortest: float, longest: float, period: float, blocks: int
 ) -> tuple[Array, Array]:
@@ -35,7 +35,7 @@ def limits(
     return low, high
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def move_on(q: Array, v: Array, age: float, tip: int, now: Array) -> None:
     """Fill in the twist, and move the end pose in ``now`` (7 + m,) on by ``age`` [s]."""
     now[6] = pose.twist(q, tip)

@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
 #: Time constant of the filter that takes the dither out [s], and of what lasts [s].
@@ -75,7 +75,7 @@ def nothing_known() -> DragShare:
     return DragShare(np.zeros(1), np.zeros(2), np.zeros((2, 3)), np.zeros((2, 3)))
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def forget(known: DragShare, numbers: Learning) -> None:
     """Let what was told fade by one step; what is left says κ."""
     known.sums[0] *= 1.0 - numbers.fade
@@ -84,7 +84,7 @@ def forget(known: DragShare, numbers: Learning) -> None:
     known.share[0] = min(max(found, 0.0), numbers.most)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def learn(known: DragShare, numbers: Learning, r: Array, h: Array) -> None:
     """Take r and h of one step at the end (3,) [m]."""
     for i in range(3):

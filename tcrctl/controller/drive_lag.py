@@ -15,8 +15,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
 
@@ -32,7 +32,7 @@ class DriveLag(NamedTuple):
     dead_time: float
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _follow(change: Array, step: float, lag: float, out: Array) -> None:
     """Fill R_L (n, rows, m) from R (n, rows, m + 1), which begins with 0 one step before."""
     keep = math.exp(-step / lag)
@@ -46,7 +46,7 @@ def _follow(change: Array, step: float, lag: float, out: Array) -> None:
                 out[n, r, c] = held
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _late(values: Array, n: int, r: int, c: int, steps: float) -> float:
     """Interpolate the value ``steps`` instants before instant n; 0 before the first."""
     at = n + 1 - steps
@@ -59,7 +59,7 @@ def _late(values: Array, n: int, r: int, c: int, steps: float) -> float:
     return float(before + part * (after - before))
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def with_lag(change: Array, step: float, drives: DriveLag, behind: Array, queue: Array) -> None:
     """Change responses of cables into those of set-points.
 

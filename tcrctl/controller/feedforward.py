@@ -13,9 +13,9 @@ of the speeds w_b with which a robot at rest in every instant would follow the r
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from tcrctl.numerics import block_banded
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array, Reference
 
 #: ε as a part of the mean diagonal of S'QS.
@@ -24,7 +24,7 @@ DAMPING = 1e-4
 SLACK = 1e-6
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def needed_speeds(gain: Array, output: Array, poses: Array, edges: Array, spacing: float) -> Array:
     """Return the speeds w (blocks, m) [m/s] with which the end, always at rest, follows the reference.
 
@@ -57,7 +57,7 @@ def needed_speeds(gain: Array, output: Array, poses: Array, edges: Array, spacin
     return speeds
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def wanted_changes(previous: Array, needed_before: Array, needed: Array) -> Array:
     """Return changes of speed that cost nothing, block by block (blocks * m,) [m/s]; the first from standstill.
 

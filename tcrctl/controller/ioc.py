@@ -17,9 +17,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.numerics import block_banded, block_solves
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.numerics.lcp import SOLVED, lcp_residuals, solve_lcp
 from tcrctl.robot.response import POSE_ROWS
 from tcrctl.signals import Array
@@ -98,7 +98,7 @@ class Solution(NamedTuple):
     outputs: Array
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def build_ioc(
     prediction: Prediction, target: Array, changes: Array, low: Array, high: Array, weights: Weights
 ) -> QuadraticProgram:
@@ -137,7 +137,7 @@ def build_ioc(
     return QuadraticProgram(H, g, low, high)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _outputs(prediction: Prediction, U: Array) -> Array:
     """Return Y (n, 7 + m)."""
     n, rows, size = prediction.gain.shape
@@ -146,7 +146,7 @@ def _outputs(prediction: Prediction, U: Array) -> Array:
     return Y
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _violated(outputs: Array, weights: Weights, chosen: Array) -> int:
     """Mark newly violated tension rows in ``chosen`` (n, 2 m), floors then ceilings; returns how many are new."""
     new, m = 0, chosen.shape[1] // 2
@@ -162,7 +162,7 @@ def _violated(outputs: Array, weights: Weights, chosen: Array) -> int:
     return new
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _rows(
     program: QuadraticProgram, prediction: Prediction, weights: Weights, chosen: Array
 ) -> tuple[Array, Array, Array]:
@@ -187,7 +187,7 @@ def _rows(
     return A, b, D
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _factor(H: Array) -> Array:
     """Return the Cholesky factor of a positive definite matrix (U, U); NaN if it is not."""
     factor = H.copy()
@@ -196,7 +196,7 @@ def _factor(H: Array) -> Array:
     return factor
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _inverse(factor: Array) -> Array:
     """Return H^-1 (U, U) for the factor of H."""
     inverse = np.eye(factor.shape[0])
@@ -205,7 +205,7 @@ def _inverse(factor: Array) -> Array:
     return inverse
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _free_minimum(factor: Array, g: Array) -> Array:
     """Return the inputs without any limits -H^-1 g (U,) for the factor of H."""
     U = -g
@@ -214,7 +214,7 @@ def _free_minimum(factor: Array, g: Array) -> Array:
     return U
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _inside(program: QuadraticProgram, U: Array) -> bool:
     """Return whether all inputs are within their limits."""
     inside = True
@@ -223,7 +223,7 @@ def _inside(program: QuadraticProgram, U: Array) -> bool:
     return inside
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def solve_ioc(program: QuadraticProgram, prediction: Prediction, weights: Weights) -> Solution:
     """Solve the program by Lemke's algorithm, adding tension rows until none outside the LCP is violated.
 

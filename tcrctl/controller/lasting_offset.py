@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.controller.drag_share import DragShare, forget, learn
 from tcrctl.controller.predictor import Tuning
 from tcrctl.controller.rest_gain import RestGain, carry, rest, tell
 from tcrctl.controller.slip import Slip
+from tcrctl.numerics.kernel import part
 from tcrctl.robot import linear
 from tcrctl.robot.equations import Workspace
 from tcrctl.robot.hole_drag import HoleDrag, drag_force
@@ -46,7 +46,7 @@ class MultiStepMemory(NamedTuple):
     learnt: RestGain
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _dragged(model: Model, ws: Workspace, memory: MultiStepMemory, turn: float) -> Array:
     """Return by what usual drag displaces the point that the robot vibrates about (n_free,) [m]."""
     moved = np.zeros(ws.r.shape[0])
@@ -56,7 +56,7 @@ def _dragged(model: Model, ws: Workspace, memory: MultiStepMemory, turn: float) 
     return moved
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _told(model: Model, ws: Workspace, memory: MultiStepMemory) -> Array:
     """Return the same for a robot that follows its drives at once (n_free,) [m]: no noise of cameras is in it."""
     speed, moved, v = memory.slip.speed, np.zeros(ws.r.shape[0]), np.zeros(memory.v.shape[0])
@@ -68,7 +68,7 @@ def _told(model: Model, ws: Workspace, memory: MultiStepMemory) -> Array:
     return moved
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def update_offset(
     model: Model,
     ws: Workspace,
@@ -118,7 +118,7 @@ def update_offset(
             memory.offset[3 * FIXED + k] += tuning.blend * (lag[k] - memory.offset[3 * FIXED + k])
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _end(base: Array, free: Array, tip: int) -> Array:
     """Return the mean displacement (3,) of the tip ring in base (3 n_nodes,) plus free (n_free,)."""
     mean = np.zeros(3)

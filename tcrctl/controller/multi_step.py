@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numba import njit
 
 from tcrctl.controller.blocks import Grid, make_grid, superpose
 from tcrctl.controller.drag_share import learning, nothing_known
@@ -33,6 +32,7 @@ from tcrctl.controller.rest_gain import gain_learning, no_gain
 from tcrctl.controller.slip import follow_slip, no_slip
 from tcrctl.controller.tension_gap import TensionGap
 from tcrctl.memory import POSITION, SPEED, Kept
+from tcrctl.numerics.kernel import kernel
 from tcrctl.robot import linear, pose, response, response_basis
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
@@ -47,7 +47,7 @@ from tcrctl.robot.statics import MAX_ITERATIONS, TOLERANCE, follow, rest_map
 from tcrctl.signals import Array
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def forecast(
     model: Model,
     load: Load,

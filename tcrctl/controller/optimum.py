@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.controller.blocks import Grid
 from tcrctl.controller.cost_arrays import fill_target
 from tcrctl.controller.feedforward import needed_speeds, wanted_changes
 from tcrctl.controller.ioc import Prediction, Solution, Weights, build_ioc, solve_ioc
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.signals import Array
 
 
@@ -36,14 +36,14 @@ class Demand(NamedTuple):
     high: Array
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _finite(values: Array) -> bool:
     """Return whether all values are finite: else their square is not."""
     flat = values.ravel()
     return bool(np.isfinite(np.dot(flat, flat)))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def optimum(
     prediction: Prediction, rest_gain: Array, demand: Demand, grid: Grid, weights: Weights
 ) -> tuple[Solution, Array]:

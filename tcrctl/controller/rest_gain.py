@@ -18,9 +18,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.controller.prediction_settings import RestGainSettings
+from tcrctl.numerics.kernel import part
 from tcrctl.robot.module import FIXED, RING
 from tcrctl.signals import Array
 
@@ -77,7 +77,7 @@ def gain_learning(settings: RestGainSettings | None, blend: float, period: float
     return GainLearning(blend * blend / (1.0 - blend), fade, doubt * doubt, settings.most)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def rest(known: RestGain, numbers: GainLearning, drive: Array, blend: float) -> None:
     """Begin where the robot rests at a drive (m,) [m]: nothing is known of G, and Δ as well as ever."""
     m = drive.shape[0]
@@ -88,7 +88,7 @@ def rest(known: RestGain, numbers: GainLearning, drive: Array, blend: float) -> 
         known.covariance[c, c] = numbers.doubt
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def carry(known: RestGain, numbers: GainLearning, drive: Array, offset: Array, tip: int) -> None:
     """Move Δ (3 n_nodes,) [m] on to the drives of a step (m,) [m], and say so in P."""
     m, P = drive.shape[0], known.covariance
@@ -116,7 +116,7 @@ def carry(known: RestGain, numbers: GainLearning, drive: Array, offset: Array, t
     _fade(known, numbers)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _fade(known: RestGain, numbers: GainLearning) -> None:
     """Forget a part of G: P goes towards that of nothing known."""
     left, P = 1.0 - numbers.fade, known.covariance
@@ -129,7 +129,7 @@ def _fade(known: RestGain, numbers: GainLearning) -> None:
         P[c, c] += (1.0 - left * left) * numbers.doubt
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def tell(known: RestGain, numbers: GainLearning, found: Array, offset: Array, tip: int) -> None:
     """Take the point that the robot vibrates about, found (n_free,) [m] from the model's equilibrium.
 
@@ -154,7 +154,7 @@ def tell(known: RestGain, numbers: GainLearning, found: Array, offset: Array, ti
     _bound(known, numbers, tip)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _end_gain(gain: Array, tip: int) -> Array:
     """Return by what G (n_free, m) moves the centre of the tip ring (3, m)."""
     end = np.zeros((3, gain.shape[1]))
@@ -165,7 +165,7 @@ def _end_gain(gain: Array, tip: int) -> Array:
     return end
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _bound(known: RestGain, numbers: GainLearning, tip: int) -> None:
     """Scale G so that no drive moves the end by more than is believed."""
     end = _end_gain(known.gain, tip)

@@ -15,8 +15,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
 
@@ -39,13 +39,13 @@ def no_slip(n_cables: int, size: int) -> Slip:
     return Slip(np.zeros(n_cables), np.zeros(n_cables), np.zeros(size))
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _part(period: float, time: float) -> float:
     """Return the part of the way that a first-order lag goes in one step; all of it without a time constant."""
     return 1.0 - math.exp(-period / time) if time > 0.0 else 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def follow_slip(slip: Slip, speed: Array, v: Array, period: float, lag: float, time: float) -> None:
     """Move on by one step.
 

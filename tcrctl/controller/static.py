@@ -15,7 +15,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.controller.blocks import Grid, make_grid, superpose
 from tcrctl.controller.inner_map import InnerMap, newton_map
@@ -24,6 +23,7 @@ from tcrctl.controller.plan import Situation
 from tcrctl.controller.prediction_settings import MultiStepSettings
 from tcrctl.controller.predictor import Forecast, Now, Tuning, make_tuning, present
 from tcrctl.memory import NORMAL, POSITION, TENSION, Kept
+from tcrctl.numerics.kernel import kernel
 from tcrctl.robot import pose
 from tcrctl.robot.equations import Load, Workspace, make_workspace
 from tcrctl.robot.equilibrium import static_load
@@ -47,7 +47,7 @@ class StaticMemory(NamedTuple):
     offset: Array
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def forecast(
     model: Model,
     load: Load,

@@ -12,9 +12,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.controller.dither_settings import DitherSettings
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.signals import Array
 
 
@@ -77,7 +77,7 @@ def still_wave(amplitude: float, steps: int) -> Wave:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _mean_size(rows: Array) -> float:
     """Return the length of the mean of rows (n, 3)."""
     square = 0.0
@@ -89,7 +89,7 @@ def _mean_size(rows: Array) -> float:
     return math.sqrt(square)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def compare(wave: Wave, numbers: Adapting, position: Array, slot: int) -> None:
     """Put the end position now (3,) [m] into a row of the buffers, and filter the innovation."""
     for i in range(3):
@@ -99,7 +99,7 @@ def compare(wave: Wave, numbers: Adapting, position: Array, slot: int) -> None:
     wave.sizes[1] += numbers.blend * (min(size, numbers.outlier) - wave.sizes[1])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def observe(
     wave: Wave, numbers: Adapting, position: Array, slot: int, expects: bool, threshold: float
 ) -> None:

@@ -11,10 +11,10 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numba import njit
 
 from tcrctl.controller.prediction_settings import TensionGapSettings
 from tcrctl.memory import TENSION, Kept
+from tcrctl.numerics.kernel import kernel
 from tcrctl.signals import Array
 
 
@@ -46,7 +46,7 @@ class TensionGap:
         return left
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _left_out(lasting: Array, smooth: Array, gap: Array, blend: float, quick: float) -> Array:
     """Move both filters (m,) [N] on by their parts of the way; return what lasts and what is noise (m,) [N]."""
     left = np.empty(gap.shape[0])

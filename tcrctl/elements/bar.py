@@ -13,15 +13,15 @@ derivative of the scalar T² / (2 (k + c w)) and the tangent for a change of r_j
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
 #: Columns of the bar parameters (n_bars, 4): l0 [m], EA / l0 [N/m], damping [N s/m], 1 if tension only.
 REST, STIFFNESS, DAMPING, TENSION_ONLY = range(4)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def direction(q: Array, i: int, j: int) -> tuple[float, float, float, float]:
     """Return the length [m] and unit vector of the line from node i to node j in ``q`` (3 n_nodes,)."""
     dx = q[3 * j] - q[3 * i]
@@ -31,7 +31,7 @@ def direction(q: Array, i: int, j: int) -> tuple[float, float, float, float]:
     return length, dx / length, dy / length, dz / length
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def tension(length: float, w: float, before: float, bars: Array, b: int) -> float:
     """Return the tension T [N] of bar ``b`` at ``length`` [m] with dl/dt = w (length - before)."""
     T = bars[b, STIFFNESS] * (length - bars[b, REST]) + bars[b, DAMPING] * w * (length - before)
@@ -40,7 +40,7 @@ def tension(length: float, w: float, before: float, bars: Array, b: int) -> floa
     return float(T)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def lengths_and_rates(q: Array, v: Array, nodes: np.ndarray, length: Array, rate: Array) -> None:
     """Fill lengths [m] and dl/dt [m/s] (n_bars,) of the bars between ``nodes`` (n_bars, 2)."""
     for b in range(nodes.shape[0]):

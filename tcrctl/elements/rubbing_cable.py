@@ -18,9 +18,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.elements import sliding_cable
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.signals import Array
 
 #: Columns of the friction of a hole (n_holes, 3): coefficient μ, least wrap angle [rad], drag [N].
@@ -84,7 +84,7 @@ class Stretches(NamedTuple):
 WALL = 1e6
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _first_positive(y: Array, n: int) -> int:
     """Return the index of the first of n increasing values that is not negative; n if all are."""
     for i in range(n):
@@ -93,7 +93,7 @@ def _first_positive(y: Array, n: int) -> int:
     return n
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _root(x: Array, y: Array, n: int, right: float) -> float:
     """Find the zero of the increasing function through n corners (x, y); y[0] < 0, slope ``right`` at the end."""
     i = _first_positive(y, n)
@@ -102,7 +102,7 @@ def _root(x: Array, y: Array, n: int, right: float) -> float:
     return float(x[i - 1] - y[i - 1] * (x[i] - x[i - 1]) / (y[i] - y[i - 1]))
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _widen(x: Array, y: Array, n: int, z: float, F: float) -> int:
     """Put a hole that holds up to F behind the chain: the function moves down by F below its root z, up above."""
     i = _first_positive(y, n)
@@ -115,7 +115,7 @@ def _widen(x: Array, y: Array, n: int, z: float, F: float) -> int:
     return n + 2
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _only_taut(x: Array, y: Array, n: int, right: float) -> int:
     """Let the function end at tension 0 with a wall; returns the new number of corners."""
     i = 0
@@ -138,7 +138,7 @@ def _only_taut(x: Array, y: Array, n: int, right: float) -> int:
     return n + shift
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def solve_chain(s: Stretches, cap: Array, first: int, last: int) -> None:
     """Solve one cable, stretches ``first`` .. ``last``: fills tension and alone from wanted and stiffness."""
     x, y = s.knots[0], s.knots[1]
@@ -159,14 +159,14 @@ def solve_chain(s: Stretches, cap: Array, first: int, last: int) -> None:
         s.tension[hole] = min(max(s.alone[hole], T - F), T + F)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def measure_leads(drive: Array, first_hole: np.ndarray, cables: Array, s: Stretches) -> None:
     """Fill the lengths of the leads, from the actuators to the base ring."""
     for c in range(drive.shape[0]):
         s.length[first_hole[c]] = cables[c, sliding_cable.LEAD] + drive[c]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def measure(
     q: Array,
     drive: Array,
@@ -185,7 +185,7 @@ def measure(
             s.direction[hole, 0], s.direction[hole, 1], s.direction[hole, 2] = ex, ey, ez
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def tensions(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) -> float:
     """Fill tensions of all stretches from their lengths; returns the incremental potential of all cables [J].
 
@@ -210,7 +210,7 @@ def tensions(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) ->
     return energy
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def group_start(s: Stretches, first: int, stretch: int) -> int:
     """Return the first stretch of the group that ends with ``stretch``: holes between them slip."""
     while stretch > first and s.tension[stretch - 1] != s.alone[stretch - 1]:
@@ -218,7 +218,7 @@ def group_start(s: Stretches, first: int, stretch: int) -> int:
     return stretch
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def group_stiffness(s: Stretches, start: int, end: int) -> float:
     """Return stiffness of stretches ``start`` .. ``end`` in series [N/m]; 0 if slackness holds their tension."""
     if s.alone[end] <= 0.0:
@@ -229,7 +229,7 @@ def group_stiffness(s: Stretches, start: int, end: int) -> float:
     return float(1.0 / compliance)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def largest_friction(hole: Array, along: float, tension: float) -> float:
     """Return F [N], what a hole holds at most, by the capstan law [SC26].
 
@@ -242,7 +242,7 @@ def largest_friction(hole: Array, along: float, tension: float) -> float:
     return float(hole[DRAG] + tension * np.expm1(hole[COEFFICIENT] * wrap))
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def begin(slip: Slip, h: float, lead: Array, first_hole: np.ndarray, s: Stretches) -> None:
     """Start an internal step of size ``h`` [s]: elongations before it, and the caps of the holes there.
 
@@ -266,7 +266,7 @@ def begin(slip: Slip, h: float, lead: Array, first_hole: np.ndarray, s: Stretche
                 slip.cap[k] = largest_friction(slip.holes[k], along, smaller)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def finish(slip: Slip, cables: Array, first_hole: np.ndarray, s: Stretches) -> float:
     """Move the material through the holes to the end of an internal step; returns the work of friction Σ F |s| [J].
 

@@ -14,15 +14,15 @@ implicit rule gives dl/dt + u = w (l + d - before); then T is the derivative of 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.signals import Array
 
 #: Columns of the cable parameters (m, 4): l0 with lead [m], EA / l0 [N/m], damping [N s/m], lead [m].
 REST, STIFFNESS, DAMPING, LEAD = range(4)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def hole_position(q: Array, nodes: np.ndarray, weights: Array, hole: int) -> tuple[float, float, float]:
     """Return the position of ``hole`` [m]; nodes (n_holes, 3) and weights (n_holes, 3)."""
     a, b, c = 3 * nodes[hole, 0], 3 * nodes[hole, 1], 3 * nodes[hole, 2]
@@ -34,7 +34,7 @@ def hole_position(q: Array, nodes: np.ndarray, weights: Array, hole: int) -> tup
     )
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def segment(q: Array, nodes: np.ndarray, weights: Array, hole: int) -> tuple[float, float, float, float]:
     """Return the length [m] and direction of the segment from ``hole`` to the next one."""
     x0, y0, z0 = hole_position(q, nodes, weights, hole)
@@ -44,7 +44,7 @@ def segment(q: Array, nodes: np.ndarray, weights: Array, hole: int) -> tuple[flo
     return length, dx / length, dy / length, dz / length
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def spread(
     G: Array, c: int, nodes: np.ndarray, weights: Array, hole: int, x: float, y: float, z: float
 ) -> None:
@@ -58,7 +58,7 @@ def spread(
             G[c, node + 2] += weight * z
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def path_gradients(
     q: Array,
     first_hole: np.ndarray,
@@ -84,7 +84,7 @@ def path_gradients(
             spread(G, c, nodes, weights, hole + 1, ex, ey, ez)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def tension(total: float, w: float, before: float, cables: Array, c: int) -> float:
     """Return λ = T [N] >= 0 of cable ``c`` at ``total`` = l + d [m] with dl/dt + u = w (total - before)."""
     T = cables[c, STIFFNESS] * (total - cables[c, REST]) + cables[c, DAMPING] * w * (total - before)

@@ -8,16 +8,16 @@ upward every ring is complete before the next one asks for it.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.numerics.rotation import matrix_from_quaternion, norm, rotation_between
 from tcrctl.robot.module import RING
 from tcrctl.robot.ring_axes import axes_of, centre_of
 from tcrctl.signals import Array
 
 
-@njit(cache=True)
+@kernel()
 def carry(before: Array, now: Array, seen: NDArray[np.bool_], known: NDArray[np.bool_]) -> None:
     """Put markers that are not seen where the ring below and the seen markers of their own ring carry them.
 
@@ -43,7 +43,7 @@ def carry(before: Array, now: Array, seen: NDArray[np.bool_], known: NDArray[np.
         turn, old, new = _turn(axes_of(ring), axes_of(found)), centre_of(ring), centre_of(found)
 
 
-@njit(cache=True)
+@part()
 def _meet(carried: Array, found: Array, there: NDArray[np.bool_]) -> None:
     """Move a carried ring rigidly onto its seen markers."""
     count, old, new = 0, np.zeros(3), np.zeros(3)
@@ -61,7 +61,7 @@ def _meet(carried: Array, found: Array, there: NDArray[np.bool_]) -> None:
         carried[i] = _moved(turn, old, new, carried[i])
 
 
-@njit(cache=True)
+@part()
 def _moved(turn: Array, old: Array, new: Array, point: Array) -> Array:
     """Return a point that a turn about ``old`` and the shift of ``old`` to ``new`` have moved."""
     moved = new.copy()
@@ -71,7 +71,7 @@ def _moved(turn: Array, old: Array, new: Array, point: Array) -> Array:
     return moved
 
 
-@njit(cache=True)
+@part()
 def _turn(old: Array, new: Array) -> Array:
     """Return the rotation (3, 3) from one triple of axes to another, one axis per row."""
     turn = np.zeros((3, 3))

@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import kernel
 from tcrctl.signals import Array
 
 #: Candidates [s].
@@ -45,7 +45,7 @@ def lags(lag: Array, period: float) -> Lags:
         return Lags(lag, np.exp(-period / lag), period)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def follow(lags: Lags, reached: Array, before: Array, now: Array) -> Array:
     """Return where drives of every time constant are at the end of a period (n, m) [m].
 
@@ -63,7 +63,7 @@ def follow(lags: Lags, reached: Array, before: Array, now: Array) -> Array:
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _best(
     lags: Lags, errors: Array, fade: float, last: Array, reported: Array, before: Array, now: Array
 ) -> float:

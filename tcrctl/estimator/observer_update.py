@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.robot import pose
 from tcrctl.robot.dynamics import Scratch, lengths_before
 from tcrctl.robot.equations import Q_FREE, SPRING, SPRING_AT, Load, Workspace
@@ -92,7 +92,7 @@ class Updated(NamedTuple):
     tip_seen: bool
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def fill_load(model: Model, body: Body, frame: Frame, numbers: Observing, s: Scratch, ws: Workspace) -> Load:
     """Return the inertia of backward Euler, weight and virtual springs of one update, kept in ``s``."""
     period, count = numbers.period, 0
@@ -112,7 +112,7 @@ def fill_load(model: Model, body: Body, frame: Frame, numbers: Observing, s: Scr
     return Load(inertia, 1.0 / period, s.nodal, s.bar_before, s.cable_before, None)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _end(q: Array, ring: int) -> Array:
     """Return position [m] and unit normal (6,) of a ring."""
     end, position, normal = np.empty(6), pose.position(q, ring), pose.normal(q, ring)
@@ -121,7 +121,7 @@ def _end(q: Array, ring: int) -> Array:
     return end
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _correct(frame: Frame, numbers: Observing, end: Array, correction: Array, blend: float) -> bool:
     """Move the correction (6,) towards what the markers of the tip ring say of the model's end; False if unseen."""
     first = numbers.tip_marker
@@ -134,7 +134,7 @@ def _correct(frame: Frame, numbers: Observing, end: Array, correction: Array, bl
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _corrected(end: Array, correction: Array) -> Array:
     """Return the end (6,) with its correction, the normal as a unit vector."""
     out = end + correction
@@ -144,7 +144,7 @@ def _corrected(end: Array, correction: Array) -> Array:
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def update(
     model: Model, before: Body, frame: Frame, numbers: Observing, blend: float, s: Scratch, ws: Workspace
 ) -> Updated:

@@ -9,21 +9,21 @@ All inner loops run along rows, so that the compiler vectorises them. Source: [G
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.signals import Array
 
 #: Doubles in a vector register: columns are quickest in multiples of it, and products take as many rows at once.
 LANES = 4
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def padded(count: int) -> int:
     """Return the number of columns to allocate for ``count`` right-hand sides."""
     return count + (LANES - count % LANES) % LANES
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def factor_diagonal(block: Array) -> bool:
     """Overwrite the upper triangle of ``block`` (b, b) by U with block = U'U; False if it is not positive."""
     b = block.shape[0]
@@ -42,7 +42,7 @@ def factor_diagonal(block: Array) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def solve_transposed(U: Array, X: Array) -> None:
     """Overwrite ``X`` (b, r) by U'^-1 X with U upper triangular (b, b)."""
     b, r = X.shape
@@ -57,7 +57,7 @@ def solve_transposed(U: Array, X: Array) -> None:
                     X[i, c] -= factor * X[k, c]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def solve_upper(U: Array, X: Array) -> None:
     """Overwrite ``X`` (b, r) by U^-1 X with U upper triangular (b, b)."""
     b, r = X.shape
@@ -72,7 +72,7 @@ def solve_upper(U: Array, X: Array) -> None:
             X[k, c] *= inverse
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _subtract_transposed_product(target: Array, left: Array, right: Array) -> None:
     """Subtract left' right from ``target``, all row-major.
 
@@ -92,13 +92,13 @@ def _subtract_transposed_product(target: Array, left: Array, right: Array) -> No
                 target[r, c] -= left[k, r] * right[k, c]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _subtract_product(target: Array, left: Array, right: Array) -> None:
     """Subtract left right from ``target``, all row-major."""
     _subtract_transposed_product(target, left.T, right)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def factor(A: Array) -> bool:
     """Overwrite ``A`` (n, w + 1, b, b) by its upper Cholesky factor.
 
@@ -121,7 +121,7 @@ def factor(A: Array) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def solve_forward(U: Array, X: Array) -> None:
     """Overwrite the right-hand sides ``X`` (n b, r) by U'^-1 X, the first half of :func:`solve`."""
     n = U.shape[0]
@@ -134,7 +134,7 @@ def solve_forward(U: Array, X: Array) -> None:
             _subtract_transposed_product(X[(j + d) * b : (j + d + 1) * b], U[j, d], here)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def solve_backward(U: Array, X: Array) -> None:
     """Overwrite ``X`` (n b, r) by U^-1 X, the second half of :func:`solve`."""
     n = U.shape[0]
@@ -147,7 +147,7 @@ def solve_backward(U: Array, X: Array) -> None:
         solve_upper(U[j, 0], here)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def solve(U: Array, X: Array) -> None:
     """Overwrite the right-hand sides by the solution of U'U x = rhs.
 
@@ -159,7 +159,7 @@ def solve(U: Array, X: Array) -> None:
     solve_backward(U, X)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_block_products(block: Array, diagonal: bool, i: int, j: int, X: Array, out: Array) -> None:
     """Add the products of ``block`` at (i, j) and, off the diagonal, of its transpose at (j, i)."""
     b = block.shape[0]
@@ -175,7 +175,7 @@ def _add_block_products(block: Array, diagonal: bool, i: int, j: int, X: Array, 
                         out[column, k] += value * X[row, k]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def multiply_columns(A: Array, X: Array, out: Array) -> None:
     """Fill out = A X for an unfactored block-banded matrix A (n, w + 1, b, b) and columns X (n b, r)."""
     out[:] = 0.0
@@ -184,7 +184,7 @@ def multiply_columns(A: Array, X: Array, out: Array) -> None:
             _add_block_products(A[j, d], d == 0, j, j + d, X, out)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def to_dense(A: Array) -> Array:
     """Return the dense symmetric matrix (n b, n b) of a block-banded one; for tests and small offline work."""
     size = A.shape[0] * A.shape[2]

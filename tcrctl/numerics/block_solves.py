@@ -7,13 +7,13 @@ loops, whose vectors are too short. One column is no columns of length one: it i
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from tcrctl.numerics.block_banded import solve_transposed, solve_upper
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _subtract(target: Array, product: Array) -> None:
     """Subtract a product from rows of columns, both (b, r)."""
     for i in range(target.shape[0]):
@@ -21,7 +21,7 @@ def _subtract(target: Array, product: Array) -> None:
             target[i, c] -= product[i, c]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def forward_columns(U: Array, X: Array) -> None:
     """Overwrite columns ``X`` (n b, r) by U'^-1 X."""
     n, bands, b = U.shape[0], U.shape[1], U.shape[2]
@@ -34,7 +34,7 @@ def forward_columns(U: Array, X: Array) -> None:
             _subtract(X[(j + d) * b : (j + d + 1) * b], product)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def backward_columns(U: Array, X: Array) -> None:
     """Overwrite columns ``X`` (n b, r) by U^-1 X."""
     n, bands, b = U.shape[0], U.shape[1], U.shape[2]
@@ -47,7 +47,7 @@ def backward_columns(U: Array, X: Array) -> None:
         solve_upper(U[j, 0], here)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def transposed_vector(U: Array, x: Array) -> None:
     """Overwrite ``x`` (b,) by U'^-1 x with U upper triangular (b, b)."""
     for k in range(x.shape[0]):
@@ -57,7 +57,7 @@ def transposed_vector(U: Array, x: Array) -> None:
             x[i] -= U[k, i] * value
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def upper_vector(U: Array, x: Array) -> None:
     """Overwrite ``x`` (b,) by U^-1 x with U upper triangular (b, b)."""
     for k in range(x.shape[0] - 1, -1, -1):
@@ -67,7 +67,7 @@ def upper_vector(U: Array, x: Array) -> None:
         x[k] = value / U[k, k]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def forward_vector(U: Array, x: Array) -> None:
     """Overwrite ``x`` (n b,) by U'^-1 x."""
     n, bands, b = U.shape[0], U.shape[1], U.shape[2]
@@ -81,7 +81,7 @@ def forward_vector(U: Array, x: Array) -> None:
                     there[i] -= block[k, i] * here[k]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def backward_vector(U: Array, x: Array) -> None:
     """Overwrite ``x`` (n b,) by U^-1 x."""
     n, bands, b = U.shape[0], U.shape[1], U.shape[2]

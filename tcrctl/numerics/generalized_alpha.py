@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
+from tcrctl.numerics.kernel import kernel
 
 
 class Coefficients(NamedTuple):
@@ -27,7 +27,7 @@ class Coefficients(NamedTuple):
     acceleration: float
 
 
-@njit(cache=True)
+@kernel()
 def coefficients(spectral_radius: float, h: float) -> Coefficients:
     """Return (15) for ``spectral_radius`` ρ in [0, 1] at infinite frequency and internal step ``h`` [s]."""
     rho = spectral_radius

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import part
 from tcrctl.numerics.lemke import PIVOT_LIMIT, PIVOTS_PER_ROW, RAY, SOLVED, Rows, pivot_to_solution, refined
 from tcrctl.signals import Array
 
@@ -57,7 +57,7 @@ def lcp_sentence(status: int) -> str:
     return _SENTENCES[status]
 
 
-@njit(cache=True)
+@part()
 def solve_lcp(M: Array, q: Array) -> tuple[Array, Array, int, int]:
     """Solve w = M z + q, w >= 0, z >= 0, w'z = 0 for positive semidefinite M, (39)-(40) in standard form.
 
@@ -92,7 +92,7 @@ def solve_lcp(M: Array, q: Array) -> tuple[Array, Array, int, int]:
     return z, w, pivots, status
 
 
-@njit(cache=True)
+@part()
 def lcp_residuals(M: Array, q: Array, z: Array) -> tuple[float, float, float]:
     """Measure how well z solves the problem, independently of any solver.
 
@@ -116,7 +116,7 @@ def lcp_residuals(M: Array, q: Array, z: Array) -> tuple[float, float, float]:
     return w_below, z_below, product
 
 
-@njit(cache=True)
+@part()
 def _usable(M: Array, q: Array) -> bool:
     """Tell whether M (n, n) and q (n,) fit and are finite."""
     n = q.size
@@ -131,13 +131,13 @@ def _usable(M: Array, q: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@part()
 def _power_of_two(x: float) -> float:
     """Round x > 0 to a power of two, so that scaling by it commits no rounding error."""
     return float(2.0 ** np.rint(np.log2(x)))
 
 
-@njit(cache=True)
+@part()
 def _scaling(M: Array, q: Array) -> tuple[Array, float]:
     """Return the scale of each row (n,), and the largest violation at z = 0 in scaled rows."""
     scale, unit = np.empty(q.size), 0.0
@@ -151,7 +151,7 @@ def _scaling(M: Array, q: Array) -> tuple[Array, float]:
     return scale, _power_of_two(unit) if unit > 0.0 else 1.0
 
 
-@njit(cache=True)
+@part()
 def _scaled(M: Array, q: Array, scale: Array, unit: float) -> tuple[Array, Array]:
     """Return the scaled M transposed (n, n) and the scaled q (n,)."""
     n = q.size
@@ -163,7 +163,7 @@ def _scaled(M: Array, q: Array, scale: Array, unit: float) -> tuple[Array, Array
     return C, p
 
 
-@njit(cache=True)
+@part()
 def _basic_z(x: Array, basis: Rows) -> Array:
     """Scatter the basic values x (n,) to z (n,), without what rounding put below 0."""
     z = np.zeros(x.size)
@@ -173,7 +173,7 @@ def _basic_z(x: Array, basis: Rows) -> Array:
     return z
 
 
-@njit(cache=True)
+@part()
 def _affine(C: Array, p: Array, z: Array) -> Array:
     """Return p + C'z (n,)."""
     w = np.empty(p.size)
@@ -186,7 +186,7 @@ def _affine(C: Array, p: Array, z: Array) -> Array:
     return w
 
 
-@njit(cache=True)
+@part()
 def _complementarity_residual(w: Array, z: Array) -> float:
     """Return max_i |min(w_i, z_i)|, 0 for solutions only; NaN if w or z holds one."""
     worst = 0.0

@@ -14,9 +14,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
 Rows = NDArray[np.int64]
@@ -33,7 +33,7 @@ ZERO: Final = 1e-13  # the artificial variable starts near 1; below this only ro
 REFINEMENTS: Final = 2  # each multiplies the error by |I - T B|, small as long as T resembles B^-1
 
 
-@njit(cache=True)
+@part()
 def pivot_to_solution(C: Array, p: Array) -> tuple[Array, Rows, int, int]:
     """Pivot from the basis of all w until the artificial variable leaves again.
 
@@ -67,7 +67,7 @@ def pivot_to_solution(C: Array, p: Array) -> tuple[Array, Rows, int, int]:
     return T, basis, PIVOTS_PER_ROW * n, PIVOT_LIMIT
 
 
-@njit(cache=True)
+@part()
 def _artificial(T: Array, basis: Rows) -> float:
     """Return the value of the artificial variable."""
     for i in range(basis.size):
@@ -76,7 +76,7 @@ def _artificial(T: Array, basis: Rows) -> float:
     return 0.0
 
 
-@njit(cache=True)
+@part()
 def _most_violated(p: Array) -> int:
     """Return the row of the smallest negative entry, the last of equals (lexicographic), or -1."""
     row, least = -1, 0.0
@@ -86,7 +86,7 @@ def _most_violated(p: Array) -> int:
     return row
 
 
-@njit(cache=True)
+@part()
 def _enter(T: Array, C: Array, basis: Rows, entering: int, column: Array, noise: Array) -> None:
     """Solve B column = entering column of [I, -M]; ``noise`` (n,) bounds the rounding error of each entry.
 
@@ -112,7 +112,7 @@ def _enter(T: Array, C: Array, basis: Rows, entering: int, column: Array, noise:
                 noise[i] += NOISE * size[k] * abs(T[1 + k, i])
 
 
-@njit(cache=True)
+@part()
 def _add_product(T: Array, y: Array, x: Array) -> None:
     """Add B^-1 y to x (n,)."""
     for k in range(y.size):
@@ -121,7 +121,7 @@ def _add_product(T: Array, y: Array, x: Array) -> None:
                 x[i] += T[1 + k, i] * y[k]
 
 
-@njit(cache=True)
+@part()
 def _subtract_basis_product(C: Array, basis: Rows, x: Array, y: Array, size: Array) -> None:
     """Subtract B x from y (n,) and add |B| |x| to size (n,)."""
     n = x.size
@@ -140,7 +140,7 @@ def _subtract_basis_product(C: Array, basis: Rows, x: Array, y: Array, size: Arr
                 size[k] += abs(x[i])
 
 
-@njit(cache=True)
+@part()
 def _leaving_row(T: Array, column: Array, noise: Array, basis: Rows) -> int:
     """Do the lexicographic minimum ratio test on rows [B^-1 p, B^-1] / column; -1 if no row limits the step.
 
@@ -166,7 +166,7 @@ def _leaving_row(T: Array, column: Array, noise: Array, basis: Rows) -> int:
     return tied[0] if count > 0 else -1
 
 
-@njit(cache=True)
+@part()
 def _least_of_ties(T: Array, k: int, column: Array, tied: Rows, count: int) -> int:
     """Keep those of the first ``count`` rows ``tied`` whose ratio T[k] / column is least; return how many."""
     least, size = np.inf, 0.0
@@ -181,7 +181,7 @@ def _least_of_ties(T: Array, k: int, column: Array, tied: Rows, count: int) -> i
     return kept
 
 
-@njit(cache=True)
+@part()
 def _pivot(T: Array, column: Array, row: int) -> None:
     """Update ``T`` for the basis in which the variable of ``column`` (n,) has taken ``row``."""
     for k in range(T.shape[0]):
@@ -192,7 +192,7 @@ def _pivot(T: Array, column: Array, row: int) -> None:
             T[k, row] = factor
 
 
-@njit(cache=True)
+@part()
 def refined(C: Array, p: Array, T: Array, basis: Rows) -> Array:
     """Solve B x = p for the final basis, by iterative refinement of T[0] with T as B^-1.
 

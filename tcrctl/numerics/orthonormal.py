@@ -7,15 +7,15 @@ products of whole matrices, a fifth of the time for twenty columns. Source: [YNY
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
 #: A column that keeps less than this part of its length beside the others adds nothing but rounding.
 DEPENDENT = 1e-6
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _inverse_factor(gram: Array) -> Array:
     """Return T (r, r), upper triangular, with T' gram T = I; zero columns for dependent ones. Overwrites gram."""
     r = gram.shape[0]
@@ -38,7 +38,7 @@ def _inverse_factor(gram: Array) -> Array:
     return T
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def orthonormalise(V: Array, MV: Array) -> Array:
     """Make V'MV = I with an inner product M; dependent columns become zero.
 

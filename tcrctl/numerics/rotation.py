@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.signals import Array
 
 SMALL = 1e-5  # below, sin(x)/x and its inverse are 1 -+ x^2/6 to machine precision
 
 
-@njit(cache=True)
+@part()
 def norm(vector: Array) -> float:
     """Return the Euclidean length of a vector (n,)."""
     total = 0.0
@@ -25,7 +25,7 @@ def norm(vector: Array) -> float:
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@part()
 def cross(a: Array, b: Array) -> Array:
     """Return the vector product of a and b (3,); numpy's own takes seconds to compile."""
     return np.array(
@@ -33,7 +33,7 @@ def cross(a: Array, b: Array) -> Array:
     )
 
 
-@njit(cache=True)
+@part()
 def quaternion_multiply(a: Array, b: Array) -> Array:
     """Return the rotation b followed by a, both (4,)."""
     return np.array(
@@ -46,13 +46,13 @@ def quaternion_multiply(a: Array, b: Array) -> Array:
     )
 
 
-@njit(cache=True)
+@part()
 def quaternion_conjugate(q: Array) -> Array:
     """Return the inverse rotation (4,)."""
     return np.array((q[0], -q[1], -q[2], -q[3]))
 
 
-@njit(cache=True)
+@kernel()
 def quaternion_exp(rotation: Array) -> Array:
     """Return the quaternion (4,) of a rotation vector: axis times angle (3,) [rad]."""
     angle = norm(rotation)
@@ -61,7 +61,7 @@ def quaternion_exp(rotation: Array) -> Array:
     return np.array((math.cos(half), scale * rotation[0], scale * rotation[1], scale * rotation[2]))
 
 
-@njit(cache=True)
+@kernel()
 def quaternion_log(q: Array) -> Array:
     """Return the shortest rotation vector (3,), angle at most pi [rad], of a unit quaternion (4,)."""
     sine = math.sqrt(q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
@@ -72,7 +72,7 @@ def quaternion_log(q: Array) -> Array:
     return np.array((scale * q[1], scale * q[2], scale * q[3]))
 
 
-@njit(cache=True)
+@kernel()
 def matrix_from_quaternion(q: Array) -> Array:
     """Return the rotation matrix (3, 3) of a unit quaternion (4,)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -85,7 +85,7 @@ def matrix_from_quaternion(q: Array) -> Array:
     )
 
 
-@njit(cache=True)
+@part()
 def quaternion_from_matrix(R: Array) -> Array:
     """Return the unit quaternion (4,) of a rotation matrix (3, 3), from its largest component."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
@@ -102,7 +102,7 @@ def quaternion_from_matrix(R: Array) -> Array:
     return full / norm(full)
 
 
-@njit(cache=True)
+@part()
 def perpendicular(n: Array) -> Array:
     """Return some unit vector (3,) perpendicular to a unit vector (3,)."""
     x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
@@ -112,13 +112,13 @@ def perpendicular(n: Array) -> Array:
     return across / norm(across)
 
 
-@njit(cache=True)
+@kernel()
 def angle_between(a: Array, b: Array) -> float:
     """Return the angle between unit vectors of any dimension [rad]; as exact near 0 and pi as between."""
     return 2.0 * math.atan2(norm(a - b), norm(a + b))
 
 
-@njit(cache=True)
+@kernel()
 def towards(start: Array, end: Array) -> Array:
     """Return the unit vector (3,) perpendicular to ``start`` in which the way to ``end`` begins.
 
@@ -129,13 +129,13 @@ def towards(start: Array, end: Array) -> Array:
     return across / length if length > 0.0 else perpendicular(start)
 
 
-@njit(cache=True)
+@kernel()
 def rotation_between(n0: Array, n1: Array) -> Array:
     """Return the shortest rotation (4,) that takes the unit vector n0 to n1, both (3,), without twist."""
     return quaternion_exp(angle_between(n0, n1) * cross(n0, towards(n0, n1)))
 
 
-@njit(cache=True)
+@kernel()
 def slerp(start: Array, end: Array, fraction: Array) -> Array:
     """Go from one unit vector to another along the great circle at constant speed.
 
@@ -156,7 +156,7 @@ def slerp(start: Array, end: Array, fraction: Array) -> Array:
     return result
 
 
-@njit(cache=True)
+@part()
 def quaternion_slerp(start: Array, end: Array, fraction: Array) -> Array:
     """Turn from one orientation to another about a fixed axis at constant speed, the short way.
 
@@ -177,7 +177,7 @@ def quaternion_slerp(start: Array, end: Array, fraction: Array) -> Array:
     return result
 
 
-@njit(cache=True)
+@kernel()
 def normal_from_angles(theta_x: float, theta_y: float) -> Array:
     """Return the end normal (3,) of the orientation angles [rad], (45) with the normal +z at rest."""
     return np.array(
@@ -189,7 +189,7 @@ def normal_from_angles(theta_x: float, theta_y: float) -> Array:
     )
 
 
-@njit(cache=True)
+@kernel()
 def angles_from_normal(n: Array) -> tuple[float, float]:
     """Solve (45) for the orientation angles of a unit normal (3,).
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.numerics.rotation import norm
 from tcrctl.robot.module import RING
 from tcrctl.robot.ring_axes import axes_of, centre_of
@@ -35,20 +35,20 @@ class Shape(NamedTuple):
         return change
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def change_since(start: Shape, now: Shape) -> Shape:
     """Return the change from one shape to another; twists by the shorter way."""
     twist = np.mod(now.twist - start.twist + np.pi, 2.0 * np.pi) - np.pi
     return Shape(now.side - start.side, now.offset - start.offset, twist, now.bend - start.bend)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _along(a: Array, b: Array) -> float:
     """Return the product of two vectors (3,)."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def measure(
     base: Array, apex: Array, markers: Array, seen: NDArray[np.bool_]
 ) -> tuple[Array, Array, Array, Array]:
@@ -86,7 +86,7 @@ def measure(
     return side, offset, twist, bend
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def typical_change(now: Array, before: Array) -> float:
     """Return the median of how much values (n, 3) have changed, of those that are known; NaN if none is."""
     change = np.abs(now - before).ravel()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.picture.kernel import Shape, change_since
 from tcrctl.picture.limits import GIVE, IN_OFFSET, IN_SIDE, IN_TWIST, SHARP, SIGMAS, USUAL, Limits
 from tcrctl.signals import Array
@@ -43,7 +43,7 @@ def joint_shares(change: Shape, limits: Limits, noise: float) -> Shares:
     return Shares(*joints(change, limits, noise))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def side_shares(change: Shape, limits: Limits, noise: float) -> Array:
     """Return the changes of sides as shares of their limit (n, 3)."""
     limit, n = limits.side + IN_SIDE * _room(noise), len(change.side)
@@ -54,7 +54,7 @@ def side_shares(change: Shape, limits: Limits, noise: float) -> Array:
     return shares
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def joints(change: Shape, limits: Limits, noise: float) -> tuple[Array, Array, Array]:
     """Return what :func:`joint_shares` holds."""
     n, room = len(change.twist), IN_OFFSET * _room(noise)
@@ -67,7 +67,7 @@ def joints(change: Shape, limits: Limits, noise: float) -> tuple[Array, Array, A
     return sideways, along, twist
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _share_sideways(change: Shape, i: int, limits: Limits, room: float) -> float:
     """Return the change of joint ``i`` sideways, beside where cables pull it, as a share of its limit."""
     x, y, z = change.offset[i]
@@ -80,7 +80,7 @@ def _share_sideways(change: Shape, i: int, limits: Limits, room: float) -> float
     return float(np.hypot(x - pull * bend[0], y - pull * bend[1]) / allowed)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _share_along(z: Array, i: int, limits: Limits, room: float) -> float:
     """Return the change of joint ``i`` along the body as a share of its limit; NaN if it is not known.
 
@@ -94,7 +94,7 @@ def _share_along(z: Array, i: int, limits: Limits, room: float) -> float:
     return share if near else np.fmin(share, abs(z[i]) / (limits.joint + GIVE + room))
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _beside(z: Array, i: int) -> tuple[float, float, bool]:
     """Return what the joints beside one say that it has moved along the body, and the largest that they have [m].
 
@@ -116,7 +116,7 @@ def _beside(z: Array, i: int) -> tuple[float, float, bool]:
     return expected, abs(there), next_to and (i == 0 or i == len(z) - 1)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _nearest(z: Array, i: int, way: int) -> int:
     """Return the next joint on one side of a joint that is known; -1 if none is."""
     j = i + way
@@ -127,23 +127,23 @@ def _nearest(z: Array, i: int, way: int) -> int:
     return -1
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _given(z: float) -> float:
     return min(max(z, -GIVE), GIVE) if z == z else np.nan
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _room(noise: float) -> float:
     """Return what unusual noise of a marker may reach [m]."""
     return SIGMAS * max(0.0, noise - USUAL)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _known(share: float) -> float:
     return share if share == share else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def is_strange(start: Shape, now: Shape, limits: Limits, noise: float) -> bool:
     """Return whether anything has changed by more than it can since the start."""
     change = change_since(start, now)

@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import kernel
 from tcrctl.plant.reality_settings import CreepBranch
 from tcrctl.signals import Array
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _grow(late: Array, strength: Array, share: Array, elastic: Array) -> Array:
     """Move late elongations (n_branches, n) by their share of the way; return the sum of their changes (n,) [m]."""
     grown = np.zeros(elastic.shape[0])

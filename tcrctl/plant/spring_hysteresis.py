@@ -12,17 +12,17 @@ F_y, which can only take energy: dissipative by construction, whatever the step.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tcrctl.elements import bar
+from tcrctl.numerics.kernel import kernel
 from tcrctl.plant.reality_settings import HysteresisSettings
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import RIGID_BARS
 from tcrctl.signals import Array
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _give_way(q: Array, nodes: NDArray[np.int64], elements: Array, longest: float) -> float:
     """Move unstretched lengths of ``elements`` (n, 4) so that none is stretched by more than ``longest`` [m]."""
     lost = 0.0

@@ -10,12 +10,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tcrctl.elements import bar, rubbing_cable, sliding_cable
 from tcrctl.elements.rubbing_cable import Slip
 from tcrctl.numerics.generalized_alpha import coefficients
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.robot.equations import FORCE, Q_FREE, Load, Workspace
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import SIZE
@@ -112,7 +112,7 @@ def make_scratch(model: Model) -> Scratch:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def lengths_before(
     model: Model, q: Array, v: Array, drive: Array, speed: Array, lag: float, s: Scratch, ws: Workspace
 ) -> None:
@@ -124,7 +124,7 @@ def lengths_before(
     _cables_before(v, drive, speed, lag, s, ws)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _bars_before(model: Model, q: Array, v: Array, lag: float, s: Scratch) -> None:
     """Fill s.bar_before with l + lag dl/dt."""
     bar.lengths_and_rates(q, v, model.bar_nodes, s.bar_before, s.bar_rate)
@@ -132,7 +132,7 @@ def _bars_before(model: Model, q: Array, v: Array, lag: float, s: Scratch) -> No
         s.bar_before[b] += lag * s.bar_rate[b]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _cables_before(v: Array, drive: Array, speed: Array, lag: float, s: Scratch, ws: Workspace) -> None:
     """Fill s.cable_before with l + d + lag (dl/dt + u), where ``ws`` has path lengths and gradients."""
     for c in range(drive.shape[0]):
@@ -143,7 +143,7 @@ def _cables_before(v: Array, drive: Array, speed: Array, lag: float, s: Scratch,
         s.cable_before[c] = ws.length[c] + drive[c] + lag * rate
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _known(q: Array, s: Scratch) -> bool:
     """Tell whether the last internal step converged, and to ``q``: then the workspace belongs to it."""
     if s.settled[0] == 0.0:
@@ -154,7 +154,7 @@ def _known(q: Array, s: Scratch) -> bool:
     return same
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _begin_cables(
     model: Model,
     x: State,
@@ -180,14 +180,14 @@ def _begin_cables(
         _cables_before(x.v, x.drive, speed, 0.5 * h, s, ws)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _finish_slip(model: Model, slip: Slip | None, s: Any) -> None:
     """End an internal step of cables that rub."""
     if slip is not None:
         rubbing_cable.finish(slip, model.cables, model.first_hole, s)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def error_share(rho: float) -> float:
     """Return the error of an internal step over the way from its predicted end, at constant q̈, to its end.
 
@@ -198,7 +198,7 @@ def error_share(rho: float) -> float:
     return abs(c.beta - 1.0 / 6.0) * (1.0 - c.alpha_m) / (c.beta * (1.0 - c.alpha_f))
 
 
-@njit(inline="always", error_model="numpy")  # compiled once, inside advance
+@part(inline="always", error_model="numpy")  # compiled once, inside advance
 def try_step(
     model: Model,
     x: State,
@@ -246,7 +246,7 @@ def try_step(
     return outcome, error
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _error(rho: float, s: Scratch) -> float:
     """Return the error of a step from the predicted s.q0 to s.q [m]."""
     largest = 0.0
@@ -255,7 +255,7 @@ def _error(rho: float, s: Scratch) -> float:
     return error_share(rho) * largest
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def advance(
     model: Model,
     x: State,

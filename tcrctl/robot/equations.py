@@ -17,11 +17,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.elements import bar, rubbing_cable, sliding_cable
 from tcrctl.elements.rubbing_cable import Slip, Stretches
 from tcrctl.numerics.block_banded import padded
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.robot import tangent
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
@@ -117,7 +117,7 @@ def make_workspace(model: Model, *, rubbing: bool = False) -> Workspace:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_force(r: Array, node: int, x: float, y: float, z: float) -> None:
     """Add a force to the residual of a free node."""
     if node >= FIXED:
@@ -127,7 +127,7 @@ def _add_force(r: Array, node: int, x: float, y: float, z: float) -> None:
         r[first + 2] += z
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_bars(q: Array, nodes: np.ndarray, bars: Array, w: float, before: Array, r: Array) -> float:
     """Add all bars to r; return their potential [J]."""
     energy = 0.0
@@ -141,7 +141,7 @@ def _add_bars(q: Array, nodes: np.ndarray, bars: Array, w: float, before: Array,
     return energy
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _pull(r: Array, nodes: np.ndarray, weights: Array, hole: int, T: float, e: Array) -> None:
     """Add tension T along e, the direction of the stretch before, at ``hole`` to the residual."""
     for i in range(3):
@@ -150,7 +150,7 @@ def _pull(r: Array, nodes: np.ndarray, weights: Array, hole: int, T: float, e: A
             _add_force(r, nodes[hole, i], f * e[0], f * e[1], f * e[2])
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _group_row(model: Model, s: Stretches, start: int, end: int, row: Array) -> None:
     """Fill ``row`` (3 n_nodes,) with the gradient of the length of stretches ``start`` .. ``end``."""
     for k in range(row.shape[0]):
@@ -164,7 +164,7 @@ def _group_row(model: Model, s: Stretches, start: int, end: int, row: Array) -> 
                     row[node + a] += f * s.direction[stretch, a]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_groups(model: Model, c: int, ws: Workspace, s: Stretches) -> None:
     """Add the groups of cable ``c``: one stretch goes into the banded part, several share a row."""
     first, end = model.first_hole[c], model.first_hole[c + 1] - 1
@@ -181,7 +181,7 @@ def _add_groups(model: Model, c: int, ws: Workspace, s: Stretches) -> None:
         end = start - 1
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_rubbing(model: Model, q: Array, drive: Array, slip: Slip, s: Stretches, ws: Workspace) -> float:
     """Add cables that rub in their holes to r, fill their stretches and groups; return their potential [J]."""
     cables, first = model.cables, model.first_hole
@@ -199,7 +199,7 @@ def _add_rubbing(model: Model, q: Array, drive: Array, slip: Slip, s: Stretches,
     return energy
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_cables(model: Model, q: Array, drive: Array, load: Load, ws: Workspace) -> float:
     """Add all cables to r, fill G, tension, axial, length; return their potential [J]."""
     cables = model.cables
@@ -218,7 +218,7 @@ def _add_cables(model: Model, q: Array, drive: Array, load: Load, ws: Workspace)
     return energy
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_all_cables(
     model: Model,
     q: Array,
@@ -234,7 +234,7 @@ def _add_all_cables(
     return _add_rubbing(model, q, drive, slip, stretches, ws)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _start(q: Array, mass: Array, inertia: float, nodal: Array, r: Array) -> float:
     """Start r with inertia, virtual springs and external forces of (*); return their potential [J]."""
     energy = 0.0
@@ -252,7 +252,7 @@ def _start(q: Array, mass: Array, inertia: float, nodal: Array, r: Array) -> flo
     return energy
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def residual(model: Model, q: Array, drive: Array, load: Load, ws: Workspace) -> float:
     """Fill ``ws`` with residual, cable gradients, lengths and tensions at ``q``.
 
@@ -271,7 +271,7 @@ def residual(model: Model, q: Array, drive: Array, load: Load, ws: Workspace) ->
     return energy + _add_all_cables(model, q, drive, load, load.slip, ws.stretches, ws)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_cable_tangent(model: Model, q: Array, stretches: Stretches | None, ws: Workspace) -> None:
     """Add the banded part of the cables' tangent."""
     nodes, weights = model.hole_nodes, model.hole_weights
@@ -281,7 +281,7 @@ def _add_cable_tangent(model: Model, q: Array, stretches: Stretches | None, ws: 
         tangent.add_stretches(ws.K, model.first_hole, nodes, weights, stretches)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def fill_tangent(model: Model, q: Array, load: Load, ws: Workspace) -> None:
     """Fill ``ws.K`` at ``q``, where :func:`residual` has been evaluated last."""
     tangent.start(ws.K, model.mass, load.inertia, load.nodal[SPRING])
@@ -289,7 +289,7 @@ def fill_tangent(model: Model, q: Array, load: Load, ws: Workspace) -> None:
     _add_cable_tangent(model, q, ws.stretches, ws)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def assemble(
     model: Model, q: Array, drive: Array, load: Load, ws: Workspace, with_tangent: bool | np.bool_
 ) -> float:

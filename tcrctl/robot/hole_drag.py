@@ -15,10 +15,10 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.elements.rubbing_cable import largest_friction
 from tcrctl.elements.sliding_cable import LEAD, segment, spread
+from tcrctl.numerics.kernel import part
 from tcrctl.robot.equations import Workspace
 from tcrctl.robot.model import Model
 from tcrctl.robot.module import FIXED, SIZE
@@ -58,7 +58,7 @@ def turn(time: float, amplitude: float) -> float:
     return time / amplitude if amplitude >= SMALL else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def fill_hole_drag(
     model: Model, q: Array, ws: Workspace, friction: Array, turn: float, drag: HoleDrag
 ) -> None:
@@ -97,7 +97,7 @@ def fill_hole_drag(
             x, bx, by, bz = x + length, ex, ey, ez
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def drag_force(model: Model, drag: HoleDrag, v: Array, speed: Array, force: Array) -> None:
     """Add the drag at node velocities v (3 n_nodes,) and drive speeds (m,) [m/s] to a force (n_free,) [N]."""
     for c in range(model.cables.shape[0]):
@@ -110,7 +110,7 @@ def drag_force(model: Model, drag: HoleDrag, v: Array, speed: Array, force: Arra
                     force[k] -= drag.coefficient[hole] * slip * drag.path[hole, k]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def project_drag(model: Model, drag: HoleDrag, V: Array, D: Array, F: Array) -> None:
     """Add the reduced drag matrix to D (r, r), and the drag of unit drive speeds to columns of F (r, m + 1)."""
     r = V.shape[1]

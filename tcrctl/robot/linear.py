@@ -12,10 +12,10 @@ system (26) with λ kept as unknown.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from tcrctl.elements.rubbing_cable import Stretches
 from tcrctl.numerics import block_banded, block_solves
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.robot.equations import Workspace
 from tcrctl.robot.module import FIXED
 from tcrctl.signals import Array
@@ -25,7 +25,7 @@ FIRST_SHIFT = 1e-9
 SHIFT_GROWTH = 30.0
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _copy(K: Array, U: Array) -> None:
     """Set U = K in plain loops, which compile in a tenth of the time of a slice assignment."""
     for j in range(K.shape[0]):
@@ -35,7 +35,7 @@ def _copy(K: Array, U: Array) -> None:
                     U[j, d, a, b] = K[j, d, a, b]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def factor_shifted(K: Array, U: Array) -> float:
     """Factor K into U, adding the smallest tried multiple of the identity that makes it positive definite.
 
@@ -66,7 +66,7 @@ def factor_shifted(K: Array, U: Array) -> float:
     return -1.0
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def in_use(ws: Workspace, stretches: Stretches | None) -> Workspace:
     """Return ``ws`` with as many rank-1 rows as are in use: cables, or groups of stretches of cables that rub."""
     if stretches is None:
@@ -80,7 +80,7 @@ def in_use(ws: Workspace, stretches: Stretches | None) -> Workspace:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def couple(ws: Workspace, b: Array) -> None:
     """Fill columns = U'^-1 [G'R, b, 0] = [W, U'^-1 b, 0] and small = Cholesky factor of P = I + W'W."""
     m, size = ws.axial.shape[0], b.shape[0]
@@ -104,7 +104,7 @@ def couple(ws: Workspace, b: Array) -> None:
     block_banded.factor_diagonal(ws.small)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _finish(ws: Workspace, X: Array) -> None:
     """Overwrite X (n_free, r) by U^-1 (I - W P^-1 W') X."""
     m = ws.axial.shape[0]
@@ -124,7 +124,7 @@ def _finish(ws: Workspace, X: Array) -> None:
     block_banded.solve_backward(ws.U, X)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def solve(ws: Workspace, b: Array, x: Array) -> None:
     """Solve A x = b with the factor in ``ws.U`` and the cables in ``ws``.
 
@@ -143,7 +143,7 @@ def solve(ws: Workspace, b: Array, x: Array) -> None:
         x[i] = X[i, 0]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def solve_again(ws: Workspace, x: Array) -> None:
     """Overwrite x (n_free,) by A^-1 x; ``columns`` and ``small`` as :func:`couple` left them."""
     m = ws.axial.shape[0]
@@ -158,7 +158,7 @@ def solve_again(ws: Workspace, x: Array) -> None:
     block_solves.backward_vector(ws.U, x)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _finish_columns(ws: Workspace, X: Array) -> None:
     """Do as :func:`_finish` for many columns."""
     m = ws.axial.shape[0]
@@ -173,14 +173,14 @@ def _finish_columns(ws: Workspace, X: Array) -> None:
     block_solves.backward_columns(ws.U, X)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def solve_many(ws: Workspace, X: Array) -> None:
     """Overwrite columns X (n_free, r) by A^-1 X; ``columns`` and ``small`` as :func:`couple` left them."""
     block_solves.forward_columns(ws.U, X)
     _finish_columns(ws, X)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def drive_gain(ws: Workspace, gain: Array) -> None:
     """Fill ∂q/∂d = -A^-1 G' C at the configuration in ``ws``.
 
@@ -196,7 +196,7 @@ def drive_gain(ws: Workspace, gain: Array) -> None:
     _finish_columns(ws, gain)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def tension_gain(ws: Workspace, gain: Array) -> Array:
     """Return ∂λ/∂d = C (I + G ∂q/∂d) (m, m) [N/m] for the ``gain`` of :func:`drive_gain`."""
     m = ws.axial.shape[0]

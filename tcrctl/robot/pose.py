@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.robot.module import FIXED
 from tcrctl.signals import Array
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def position(q: Array, ring: int) -> Array:
     """Return the centroid (3,) [m] of the ring whose first node is row ``ring`` of ``q`` (3 n_nodes,)."""
     y = np.zeros(3)
@@ -19,7 +19,7 @@ def position(q: Array, ring: int) -> Array:
     return y
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _area_vector(q: Array, ring: int) -> Array:
     """Return (r2 - r1) x (r3 - r2) (3,) [m2]: +z at rest for nodes counter-clockwise seen from +z."""
     a, b, c = 3 * ring, 3 * ring + 3, 3 * ring + 6
@@ -30,7 +30,7 @@ def _area_vector(q: Array, ring: int) -> Array:
     return d
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def normal(q: Array, ring: int) -> Array:
     """Return the unit normal (3,) of the ring, +z at rest (REFERENCES.md, correction 6)."""
     d = _area_vector(q, ring)
@@ -39,7 +39,7 @@ def normal(q: Array, ring: int) -> Array:
     return n
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def twist(q: Array, ring: int) -> float:
     """Return rotation [rad] of the ring about its normal against the shortest rotation from rest (node 1 on +x)."""
     n, y = normal(q, ring), position(q, ring)
@@ -57,7 +57,7 @@ def twist(q: Array, ring: int) -> float:
     return float(np.arctan2(across, along))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def output_matrix(q: Array, ring: int) -> Array:
     """Return derivatives (7, 9) of position, normal and twist with respect to the ring's nine coordinates.
 
@@ -93,7 +93,7 @@ def output_matrix(q: Array, ring: int) -> Array:
     return C
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def drive_gain(q: Array, gain: Array, ring: int) -> Array:
     """Return derivatives (7, m) of position, normal and twist of a ring by the drives.
 

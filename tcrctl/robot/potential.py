@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.robot import linear
 from tcrctl.robot.equations import Load, Workspace, fill_tangent, residual
 from tcrctl.robot.model import Model
@@ -43,7 +43,7 @@ class Outcome(NamedTuple):
     shift: float
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _largest(x: Array) -> float:
     """Return the largest magnitude in x; NaN if there is one."""
     out = 0.0
@@ -53,7 +53,7 @@ def _largest(x: Array) -> float:
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _search(
     model: Model, q: Array, drive: Array, load: Load, ws: Workspace, p: Array, start: float
 ) -> tuple[bool, float]:
@@ -77,7 +77,7 @@ def _search(
     return False, start
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def minimise(
     model: Model,
     q: Array,

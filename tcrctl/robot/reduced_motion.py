@@ -14,9 +14,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.numerics import block_banded
+from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
 GAMMA = 1.0 - np.sqrt(0.5)
@@ -60,7 +60,7 @@ class Stepping(NamedTuple):
     speed: Array
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def prepare(stiffness: Array, damping: float, h: float, pull: Pull) -> tuple[Stepping, bool]:
     """Get ready for steps of length h; False if the matrix of a stage is not positive definite.
 
@@ -85,7 +85,7 @@ def prepare(stiffness: Array, damping: float, h: float, pull: Pull) -> tuple[Ste
     return Stepping(inverse, h, damping, scratch[0], scratch[1], scratch[2]), positive
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _stage(s: Stepping, t: float, pull: Pull, x: Array, v: Array) -> None:
     """Set the positions of a stage, from its start x, v: inverse (a x + b v + b D x + F + f + t P), a = b² + α b.
 
@@ -104,7 +104,7 @@ def _stage(s: Stepping, t: float, pull: Pull, x: Array, v: Array) -> None:
     np.dot(s.inverse, s.force, s.stage)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _turn(s: Stepping, pull: Pull, speed: Array, part: float) -> None:
     """Let the drag go a part of its way in a stage, whose speeds are (r, m + 1)."""
     if pull.drags:
@@ -114,7 +114,7 @@ def _turn(s: Stepping, pull: Pull, speed: Array, part: float) -> None:
             held[k] += part * (steady[k] - slip[k] - pull.turned * held[k])
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def step(s: Stepping, t: float, pull: Pull, x: Array, vx: Array) -> None:
     """Move on by one step.
 

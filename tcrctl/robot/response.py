@@ -20,8 +20,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import part
 from tcrctl.robot import pose
 from tcrctl.robot.equations import Workspace
 from tcrctl.robot.hole_drag import HoleDrag, project_drag
@@ -63,7 +63,7 @@ class Drag(NamedTuple):
     time: float
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _pull(model: Model, ws: Workspace, V: Array, lengths: Array, drag: Drag, h: float) -> Pull:
     """Return what acts in steps of h on the basis V; ``lengths`` are G V (m, r)."""
     m, r = lengths.shape
@@ -86,7 +86,7 @@ def _pull(model: Model, ws: Workspace, V: Array, lengths: Array, drag: Drag, h: 
     return pull
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _pull_further(reduced: Reduced, gain: Array, pull: Pull) -> Array:
     """Let unit ramps end where they do with ``gain`` (n_free, m) more; return the cable lengths of it (m, m).
 
@@ -99,7 +99,7 @@ def _pull_further(reduced: Reduced, gain: Array, pull: Pull) -> Array:
     return lengths
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _observe(C: Array, axial: Array, unseen: Array, t: float, x: Array, out: Array) -> None:
     """Fill out (7 + m, m + 1), end pose and tension changes of reduced positions x (r, m + 1).
 
@@ -121,7 +121,7 @@ def _observe(C: Array, axial: Array, unseen: Array, t: float, x: Array, out: Arr
             out[POSE_ROWS + cable, c] *= axial[cable]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def respond(
     model: Model,
     q_eq: Array,
@@ -170,7 +170,7 @@ def respond(
     return change, True
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _output_rows(q_eq: Array, tip: int, V: Array, lengths: Array) -> Array:
     """Return end pose and cable lengths by the reduced positions (7 + m, r)."""
     first, C = 3 * (tip - FIXED), np.empty((POSE_ROWS + lengths.shape[0], V.shape[1]))

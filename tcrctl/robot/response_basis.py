@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.elements.sliding_cable import STIFFNESS
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.numerics.orthonormal import orthonormalise
 from tcrctl.robot import linear
 from tcrctl.robot.equations import Workspace
@@ -36,14 +36,14 @@ class Reduced(NamedTuple):
     lengths: Array
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def mass_columns(mass: Array, X: Array, out: Array) -> None:
     """Set out = M X for columns X (n_free, r)."""
     for i in range(mass.shape[0]):
         np.dot(mass[i], X[SIZE * i : SIZE * (i + 1)], out[SIZE * i : SIZE * (i + 1)])
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def count_as_taut(model: Model, ws: Workspace) -> None:
     """Count all cables as two-sided in a workspace that is coupled for those that are taut."""
     slack = False
@@ -54,7 +54,7 @@ def count_as_taut(model: Model, ws: Workspace) -> None:
         linear.couple(ws, ws.r)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def refine_basis(model: Model, ws: Workspace, V: Array) -> Reduced:
     """Iterate the modes in V once; its last m columns become the static answers to the drives.
 

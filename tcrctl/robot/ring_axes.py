@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from tcrctl.numerics.kernel import part
 from tcrctl.numerics.rotation import cross, norm
 from tcrctl.robot.module import RING
 from tcrctl.signals import Array
@@ -20,7 +20,7 @@ def ring_frames(nodes: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
-@njit(cache=True)
+@part()
 def axes_of(ring: Array) -> Array:
     """Return those of one ring (3, 3), one per row, from its nodes (3, 3), in a kernel; NaN if it has none."""
     side = ring[1] - ring[0]
@@ -32,7 +32,7 @@ def axes_of(ring: Array) -> Array:
     return axes
 
 
-@njit(cache=True)
+@part()
 def centre_of(ring: Array) -> Array:
     """Return the centre of one ring (3,) [m] from its nodes (3, 3)."""
     centre: Array = (ring[0] + ring[1] + ring[2]) / RING

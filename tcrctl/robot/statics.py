@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tcrctl.elements.sliding_cable import STIFFNESS
+from tcrctl.numerics.kernel import kernel
 from tcrctl.robot import linear, pose
 from tcrctl.robot.equations import Load, Workspace
 from tcrctl.robot.equilibrium import TOLERANCE as _ROUNDING
@@ -49,7 +49,7 @@ def rest_map(robot: Robot) -> StaticMap:
     return StaticMap(robot.rest.q.copy(), np.zeros(robot.n_cables), robot.rest.gain.copy())
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def follow(model: Model, load: Load, ws: Workspace, at: StaticMap, drive: Array, tolerance: float) -> Outcome:
     """Move the model's equilibrium to other drives, starting where its static gain points to.
 
@@ -73,7 +73,7 @@ def follow(model: Model, load: Load, ws: Workspace, at: StaticMap, drive: Array,
     return outcome
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def static_outputs(model: Model, ws: Workspace, at: StaticMap, tip: int) -> tuple[Array, Array]:
     """Return the outputs at rest (7 + m,) and their derivatives by the drives (7 + m, m).
 

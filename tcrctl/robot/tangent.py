@@ -9,15 +9,15 @@ k_c g_c g_c', are not in K; see ``linear``.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from tcrctl.elements import bar, sliding_cable
 from tcrctl.elements.rubbing_cable import Stretches
+from tcrctl.numerics.kernel import part
 from tcrctl.robot.module import FIXED, NODES, SIZE
 from tcrctl.signals import Array
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _fill_line(s: Array, axial: float, lateral: float, ex: float, ey: float, ez: float) -> None:
     """Fill s = axial e e' + lateral (I - e e') as (xx, xy, xz, yy, yz, zz)."""
     d = axial - lateral
@@ -29,7 +29,7 @@ def _fill_line(s: Array, axial: float, lateral: float, ex: float, ey: float, ez:
     s[5] = d * ez * ez + lateral
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_pair(K: Array, i: int, j: int, f: float, s: Array) -> None:
     """Add f s at node pair (i, j), and by symmetry (j, i), to the upper triangle of K."""
     if i < FIXED or j < FIXED:
@@ -49,7 +49,7 @@ def _add_pair(K: Array, i: int, j: int, f: float, s: Array) -> None:
     block[a + 2, b + 2] += f * s[5]
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def start(K: Array, mass: Array, inertia: float, spring: Array) -> None:
     """Set K to inertia M + S; mass (n_modules, 12, 12) [kg], inertia [1/s2], spring (3 n_nodes,) [N/m]."""
     for j in range(K.shape[0]):
@@ -63,7 +63,7 @@ def start(K: Array, mass: Array, inertia: float, spring: Array) -> None:
                     K[j, d, a, b] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def add_bars(K: Array, q: Array, nodes: np.ndarray, bars: Array, w: float, before: Array) -> None:
     """Add all bars that are not slack; arguments as in ``elements.bar``."""
     s = np.empty(6)
@@ -79,7 +79,7 @@ def add_bars(K: Array, q: Array, nodes: np.ndarray, bars: Array, w: float, befor
         _add_pair(K, i, j, -1.0, s)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def _add_holes(
     K: Array, nodes: np.ndarray, weights: Array, hole: int, other: int, f: float, s: Array
 ) -> None:
@@ -91,7 +91,7 @@ def _add_holes(
                     _add_pair(K, nodes[hole, a], nodes[other, b], f * weights[hole, a] * weights[other, b], s)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def add_cables(
     K: Array, q: Array, first_hole: np.ndarray, nodes: np.ndarray, weights: Array, tension: Array
 ) -> None:
@@ -107,7 +107,7 @@ def add_cables(
                 _add_holes(K, nodes, weights, hole, hole + 1, -1.0, s)
 
 
-@njit(cache=True, error_model="numpy")
+@part(error_model="numpy")
 def add_stretches(K: Array, first_hole: np.ndarray, nodes: np.ndarray, weights: Array, s: Stretches) -> None:
     """Add every stretch of cables that rub: its tension across, and along it the stiffness of a group of one."""
     block = np.empty(6)

@@ -10,15 +10,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tcrctl.numerics.kernel import kernel, part
 from tcrctl.signals import Array
 
 DEEPEST = 40  # halvings of a segment; it is below any tolerance then
 
 
-@njit(cache=True)
+@part()
 def point_distance(u: float, v: float, w: float, half: Array, holes: Array) -> float:
     """Return the distance of a point to a plate.
 
@@ -40,7 +40,7 @@ def point_distance(u: float, v: float, w: float, half: Array, holes: Array) -> f
     return math.sqrt(beyond_u * beyond_u + beyond_v * beyond_v + w * w)
 
 
-@njit(cache=True)
+@part()
 def segment_distance(
     start: Array, end: Array, half: Array, holes: Array, farthest: float, tolerance: float
 ) -> float:
@@ -80,7 +80,7 @@ def segment_distance(
     return best
 
 
-@njit(cache=True)
+@part()
 def crosses(start: Array, end: Array, half: Array, holes: Array) -> bool:
     """Tell whether a segment goes through the material of a plate; arguments as in ``segment_distance``."""
     if start[2] * end[2] > 0.0 or start[2] == end[2]:
@@ -108,7 +108,7 @@ class Plates(NamedTuple):
     holes: Array
 
 
-@njit(cache=True)
+@part()
 def _local(plates: Plates, i: int, point: Array, found: Array) -> None:
     """Put the coordinates of a point (3,) in the frame of plate i into ``found`` (3,)."""
     frame, middle = plates.frame, plates.middle
@@ -117,7 +117,7 @@ def _local(plates: Plates, i: int, point: Array, found: Array) -> None:
         found[a] = frame[i, a, 0] * x + frame[i, a, 1] * y + frame[i, a, 2] * z
 
 
-@njit(cache=True)
+@kernel()
 def nearest(
     plates: Plates, start: Array, end: Array, farthest: float, tolerance: float
 ) -> tuple[float, int, int]:
@@ -150,7 +150,7 @@ def nearest(
     return best, segment, plate
 
 
-@njit(cache=True)
+@kernel()
 def blocks(plates: Plates, start: Array, end: Array) -> bool:
     """Tell whether the segment between two points (3,) [m] goes through the material of any plate."""
     a, b = np.empty(3), np.empty(3)

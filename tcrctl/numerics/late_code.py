@@ -1,0 +1,106 @@
+"""Machine code of a kernel is made when somebody asks for a pointer into it, and not before.
+
+numba optimises every kernel together with all that it calls, and translates that into machine code. Of a kernel
+that only kernels call nobody ever runs it: callers link its bitcode, optimise and translate it again. Without that
+a cold start takes three quarters of the time; what Python calls is made as ever, to the bit.
+
+The names of numba used here are not public. Where one of them is missing, numba works as it always does.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, Final
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.registry import cpu_target
+
+_NEEDED: Final = (
+    "_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals", "_unserialize",
+    "get_pointer_to_function", "serialize_using_object_code", "serialize_using_bitcode",
+)  # fmt: skip
+
+
+@cache
+def make_code_late() -> bool:
+    """Begin, for everything that this process compiles from now on; returns whether this numba can."""
+    codegen = cpu_target.target_context.codegen()
+    known = all(hasattr(JITCodeLibrary, name) for name in _NEEDED)
+    if not known or getattr(codegen, "_library_class", None) is not JITCodeLibrary:
+        return False
+    codegen._library_class = _LateLibrary
+    codegen.set_env = _Environments(codegen).set
+    return True
+
+
+class _LateLibrary(JITCodeLibrary):  # type: ignore[misc,unused-ignore]
+    """What one kernel became, with all that it calls."""
+
+    _made = False
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return the address of a function, 0 if it is not defined here."""
+        self._ensure_finalized()
+        if not self._made:
+            if not _defines(self._final_module, name):
+                return 0
+            super()._optimize_final_module()
+            self._make()
+        address: int = super().get_pointer_to_function(name)
+        return address
+
+    def serialize_using_object_code(self) -> Any:
+        """Return what is kept: machine code if there is any, else bitcode for callers."""
+        self._ensure_finalized()
+        return super().serialize_using_object_code() if self._made else self.serialize_using_bitcode()
+
+    def _optimize_final_module(self) -> None:
+        """Wait."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()  # they forbid to keep a kernel, with machine code or without
+        self._finalized = True
+
+    def _make(self) -> None:
+        self._made = True
+        super()._finalize_final_module()
+        self._codegen.set_env.__self__.set_late(self._final_module)
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> Any:
+        library = super()._unserialize(codegen, state)
+        if state[1] == "object":
+            library._make()
+        return library
+
+
+class _Environments:
+    """Where kernels find their constants in Python: a variable in machine code, which may not be there yet."""
+
+    def __init__(self, codegen: Any):
+        """Take numba's code generator."""
+        self._engine = codegen._engine
+        self._set = codegen.set_env
+        self._waiting: dict[str, Any] = {}
+
+    def set(self, name: str, environment: Any) -> None:
+        """Set a variable, now or as soon as it is there."""
+        if self._engine.get_global_value_address(name):
+            self._set(name, environment)
+        else:
+            self._waiting[name] = environment
+
+    def set_late(self, module: Any) -> None:
+        """Set the variables of a module that was made now."""
+        if not self._waiting:
+            return
+        for variable in module.global_variables:
+            if variable.name in self._waiting and self._engine.get_global_value_address(variable.name):
+                self._set(variable.name, self._waiting.pop(variable.name))
+
+
+def _defines(module: Any, name: str) -> bool:
+    try:
+        return not module.get_function(name).is_declaration
+    except NameError:
+        return False
