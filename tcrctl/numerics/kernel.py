@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from types import FunctionType
-from typing import Any, Final
+from typing import Any, Final, TypeVar, cast
 
 from numba import njit
 from numba.core.registry import CPUDispatcher
@@ -22,30 +22,31 @@ make_code_late()
 #: Options that change what a kernel does.
 _KEPT: Final = ("error_model", "fastmath", "nogil", "inline")
 
-Decorator = Callable[[Callable[..., Any]], Any]
+_njit: Any = njit  # it wants every option by name
+F = TypeVar("F", bound=Callable[..., Any])
 
 
-def kernel(**options: Any) -> Decorator:
+def kernel(**options: Any) -> Callable[[F], F]:
     """Return the decorator of a function that Python calls, and other kernels may.
 
     Args:
         options: Of :func:`numba.njit`.
     """
-    return njit(cache=True, no_cfunc_wrapper=True, **options)
+    return cast(Callable[[F], F], _njit(cache=True, no_cfunc_wrapper=True, **options))
 
 
-def part(**options: Any) -> Decorator:
+def part(**options: Any) -> Callable[[F], F]:
     """Return the decorator of a function that only kernels call.
 
     Args:
         options: Of :func:`numba.njit`.
     """
 
-    def decorate(function: Callable[..., Any]) -> Any:
-        made = njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)(function)
+    def decorate(function: F) -> F:
+        made: Any = _njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)(function)
         if isinstance(made, CPUDispatcher):  # else the compiler is switched off
             made.__class__ = Part  # numba has no option for it
-        return made
+        return cast(F, made)
 
     return decorate
 

@@ -29,7 +29,7 @@ def make_code_late() -> bool:
     if not known or getattr(codegen, "_library_class", None) is not JITCodeLibrary:
         return False
     codegen._library_class = _LateLibrary
-    codegen.set_env = _Environments(codegen).set
+    codegen.set_env = _environments(codegen).set
     return True
 
 
@@ -64,7 +64,7 @@ class _LateLibrary(JITCodeLibrary):  # type: ignore[misc,unused-ignore]
     def _make(self) -> None:
         self._made = True
         super()._finalize_final_module()
-        self._codegen.set_env.__self__.set_late(self._final_module)
+        _environments(self._codegen).set_late(self._final_module)
 
     @classmethod
     def _unserialize(cls, codegen: Any, state: Any) -> Any:
@@ -97,6 +97,11 @@ class _Environments:
         for variable in module.global_variables:
             if variable.name in self._waiting and self._engine.get_global_value_address(variable.name):
                 self._set(variable.name, self._waiting.pop(variable.name))
+
+
+@cache
+def _environments(codegen: Any) -> _Environments:
+    return _Environments(codegen)
 
 
 def _defines(module: Any, name: str) -> bool:
