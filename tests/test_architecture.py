@@ -17,7 +17,7 @@ SOURCES = sorted((ROOT / "tcrctl").rglob("*.py")) + sorted((ROOT / "hardware").r
 
 LONGEST_FILE = 300
 LONGEST_FUNCTION = 60
-HEAVY = {"numba", "scipy", "mcap", "matplotlib", "google.protobuf"}
+HEAVY = {"numba", "numpy", "scipy", "mcap", "matplotlib", "google.protobuf", "pydantic"}
 
 CHECKS = {
     "layers": ["-c", "from importlinter.cli import lint_imports_command as check; check()"],

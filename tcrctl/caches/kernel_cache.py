@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -19,12 +20,15 @@ from typing import Any, Final
 from uuid import uuid4
 
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.registry import cpu_target
 from numba.core.serialize import dumps
 
 from tcrctl.caches.kernel_folder import kernel_folder, used
 from tcrctl.caches.kernel_sources import kernel_sources
 from tcrctl.regular_file import open_file
 
+#: Is held while a file is written, which a process that ends on its own may wait for.
+WRITING: Final = threading.Lock()
 _DIGEST: Final = hashlib.sha256().digest_size
 
 
@@ -74,6 +78,11 @@ class KernelCache(FunctionCache):
         except OSError as error:
             kernel_folder().trouble = str(error)
 
+    def holds(self, sig: Any) -> bool:
+        """Tell whether there is a file for some types of arguments, whatever is in it."""
+        file = self._file(self._key(sig, cpu_target.target_context.codegen()))
+        return any(path.exists() for path in kernel_folder().found(file))
+
     def _key(self, sig: Any, codegen: Any) -> Any:
         """Return types, processor, and bytecode with what a closure holds."""
         return self._index_key(sig, codegen)  # type: ignore[no-untyped-call]
@@ -112,10 +121,11 @@ def _write(path: Path, content: bytes) -> None:
     """Write a file that is there whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)  # another process may have pruned it
     part = path.with_name(f"{uuid4().hex}.part")
-    try:
-        part.write_bytes(content)
-        os.replace(part, path)
-    except OSError:
-        with suppress(OSError):
-            part.unlink()
-        raise
+    with WRITING:
+        try:
+            part.write_bytes(content)
+            os.replace(part, path)
+        except OSError:
+            with suppress(OSError):
+                part.unlink()
+            raise

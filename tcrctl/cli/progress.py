@@ -62,6 +62,46 @@ def progress_bar(name: str, *, shown: bool = True) -> Iterator[Callable[[int, in
 
 
 @contextmanager
+def kernels_bar(*, shown: bool = True) -> Iterator[Callable[[int, int, float | None], None]]:
+    """Show how far the compiler is, from the first word of it to the last; on terminals only.
+
+    Yields:
+        Takes kernels done and in all, and the seconds that are left, None while that is unknown.
+    """
+    if not (shown and sys.stderr.isatty()):
+        yield lambda done, total, left: None
+        return
+    name = "compiling kernels"
+    if not has_styles(sys.stderr):
+        spoken = SpokenProgress()
+        yield lambda done, total, left: spoken.say(name, done, total)
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[left]}"),
+    )
+    bar = Progress(*columns, console=console(stderr=True), transient=True)
+    task = bar.add_task(name, total=None, left="")
+
+    def told(done: int, total: int, left: float | None) -> None:
+        bar.update(task, completed=done, total=total, left="" if left is None else f"{left:.0f} s left")
+        if done == total:
+            bar.stop()
+        elif not bar.live.is_started:
+            bar.start()
+            bar.console.show_cursor(True)  # Ctrl-C ends the process at once, and would leave it hidden
+
+    try:
+        yield told
+    finally:
+        bar.stop()
+
+
+@contextmanager
 def runs_bar(name: str, total: int, *, quiet: bool) -> Iterator[Callable[[PlannedRun, Row], None]]:
     """Show a bar of the runs of a study on a terminal that takes one; elsewhere a line for every run."""
     count, styled = 0, has_styles(sys.stderr)

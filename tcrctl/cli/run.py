@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcrctl.cli.options import LOGS, AsJson, Overrides, Quiet, Spec, to_make, unfolded
-from tcrctl.cli.progress import progress_bar
+from tcrctl.cli.progress import kernels_bar, progress_bar
 
 if TYPE_CHECKING:
     from tcrctl.experiment.feasibility import StaticPath
@@ -116,7 +116,8 @@ def run(
             tap = stack.enter_context(_live_view(loaded, viewing, say) if shown else nullcontext())
             from tcrctl.experiment.prepare import prepare
 
-            experiment = prepare(loaded, seed=manner.seed, notify=say)
+            with kernels_bar(shown=not quiet) as watch:
+                experiment = prepare(loaded, seed=manner.seed, notify=say, watch=watch)
             path = _planned(experiment, manner.force, say)
         if dry_run:
             if as_json or not quiet:

@@ -89,6 +89,7 @@ def _write(found: Workspace, folder: Path) -> None:
 
 
 def _print(found: Workspace, folder: Path) -> None:
+
     made = found.as_json()
     for axis, span in made["offset"].items():
         print(

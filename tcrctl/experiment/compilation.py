@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+#: Takes kernels done and in all, and the seconds that are left, None while that is unknown.
+Watch = Callable[[int, int, float | None], None]
+
+
+def unwatched(done: int, total: int, left: float | None) -> None:
+    """Tell nobody."""
+
 
 @contextmanager
-def announced_compilation(say: Callable[[str], None]) -> Iterator[None]:
+def announced_compilation(
+    say: Callable[[str], None], words: Iterable[str] | None = None, watch: Watch = unwatched
+) -> Iterator[None]:
     """Say so once, when the first kernel is compiled in the ``with`` body; nothing if all are cached.
+
+    Then everything else that is needed is compiled ahead, on all cores.
 
     Args:
         say: Takes the sentence; is called in the middle of the work, so it should only print.
+        words: Of the settings (:mod:`tcrctl.experiment.kernel_words`); nothing is compiled ahead if None.
+        watch: Is told how far that is.
     """
     from numba.core import event  # heavy
 
@@ -24,6 +37,8 @@ def announced_compilation(say: Callable[[str], None]) -> Iterator[None]:
             if self.told is None:
                 self.told = _sentence()
                 say(self.told)
+                if words is not None:
+                    _compile_ahead(say, words, watch)
 
         def on_end(self, event: Any) -> None:
             del event
@@ -33,6 +48,14 @@ def announced_compilation(say: Callable[[str], None]) -> Iterator[None]:
         yield
     if listener.told is not None and _sentence() != listener.told:  # a full disk, say
         say(_sentence())
+
+
+def _compile_ahead(say: Callable[[str], None], words: Iterable[str], watch: Watch) -> None:
+    from tcrctl.kernels.ahead import compile_ahead  # heavy
+
+    failed = compile_ahead(words, watch)
+    if failed:
+        say(f"{failed} of them could not be compiled ahead; the run compiles them when it needs them")
 
 
 def _sentence() -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from multiprocessing import parent_process
 from typing import Any, Final
 
 import numpy as np
@@ -16,9 +17,10 @@ from tcrctl.estimator.calibration import MarkerCalibration
 from tcrctl.estimator.drives import BelievedDrives
 from tcrctl.estimator.estimator import build_estimator
 from tcrctl.estimator.exact import TrueState
-from tcrctl.experiment.compilation import announced_compilation
+from tcrctl.experiment.compilation import Watch, announced_compilation, unwatched
 from tcrctl.experiment.feasibility import DriveLimits, StaticPath, check_drives, check_feasibility
 from tcrctl.experiment.first_look import Report, build_picture, first_frames, measured_pose
+from tcrctl.experiment.kernel_words import kernel_words
 from tcrctl.experiment.metrics import Metrics
 from tcrctl.experiment.plant_robot import description_of_plant
 from tcrctl.experiment.spec import ExperimentSpec, LoadedSpec, with_draws
@@ -114,20 +116,32 @@ PLANTS: Final[Mapping[str, tuple[type[PlantSection], PlantBuilder]]] = {
 }
 
 
-def prepare(loaded: LoadedSpec, *, seed: int | None = None, notify: Notify = silent) -> Experiment:
+def prepare(
+    loaded: LoadedSpec,
+    *,
+    seed: int | None = None,
+    notify: Notify = silent,
+    watch: Watch = unwatched,
+    ahead: bool | None = None,
+) -> Experiment:
     """Build robot and trajectory, and rehearse a few steps so that no kernel is compiled or loaded in a run.
 
     Args:
         loaded: The experiment.
         seed: Seed of everything random; that of the experiment if None.
         notify: Takes messages for the user.
+        watch: Is told how far it is with kernels that are compiled ahead.
+        ahead: Whether they are, on all cores, if some are not in the cache; if None, unless this process is one of
+            several that work side by side.
 
     Raises:
         InputError: If robot, trajectory and controller do not go together.
         NoEquilibriumError: If the robot has no stable shape.
     """
     spec = with_draws(loaded.spec, len(loaded.robot.cables.routes), seed)
-    with announced_compilation(notify):
+    ahead = parent_process() is None if ahead is None else ahead
+    words = kernel_words(spec, loaded.robot) if ahead else None
+    with announced_compilation(notify, words, watch):
         robot = build_robot(loaded.robot)
         trajectory = make_trajectory(spec, robot)
         if spec.controller.tracks == "pose" and trajectory.normal(np.zeros(1)) is None:

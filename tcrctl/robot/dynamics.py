@@ -200,20 +200,9 @@ def error_share(rho: float) -> float:
 
 @part(inline="always", error_model="numpy")  # compiled once, inside advance
 def try_step(
-    model: Model,
-    x: State,
-    speed: Array,
-    h: float,
-    rule: Rule,
-    external: Array,
-    ws: Workspace,
-    s: Scratch,
+    model: Model, x: State, speed: Array, h: float, rule: Rule, external: Array, ws: Workspace, s: Scratch
 ) -> tuple[Outcome, float]:
-    """Try one internal step of size ``h`` [s]; changes ``x`` only if it converges, with an error within the bound.
-
-    Returns:
-        Its outcome, and its error [m].
-    """
+    """Try one internal step ``h`` [s]; changes ``x`` only if it converges within the bound; returns its error [m], too."""
     c = coefficients(rule.rho, h)
     _bars_before(model, x.q, x.v, 0.5 * h, s)
     _begin_cables(model, x, speed, h, x.slip, ws.stretches, s, ws)

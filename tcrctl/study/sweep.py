@@ -144,7 +144,7 @@ def _rows(
             _orders(study, missing, folder, logs),
             check=interruption.check,
             deadline_s=deadline,
-            warm=partial(prepare, first),
+            warm=partial(prepare, first, ahead=True),
         ):
             if isinstance(row, Crash):
                 row = Row(order.address, "crashed", row.reason, program=program())
