@@ -7,6 +7,7 @@ nox -s docs                   # build the documentation site with all its figure
 nox -s typed                  # type the commands of every document
 nox -s examples               # install the packages in examples/ and run their tests
 nox -s pictures bench         # draw the pictures of the documents again, print the tables of cost
+nox -s kernels                # write the list of kernels that runs need
 nox -s pin                    # write constraints.txt anew
 """
 
@@ -98,6 +99,12 @@ def bench(session: nox.Session) -> None:
     """Print what a step of control, plant, log and cameras costs."""
     for name in BENCHMARKS:
         session.run("python", f"benchmarks/{name}.py")
+
+
+@nox.session
+def kernels(session: nox.Session) -> None:
+    """Write the list of kernels that runs need, which are compiled ahead of them."""
+    session.run("python", "benchmarks/needed_kernels.py", *session.posargs)
 
 
 @nox.session(venv_backend="venv")

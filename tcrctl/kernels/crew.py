@@ -7,8 +7,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from tcrctl.kernels.order import Order
 from tcrctl.kernels.worker import DONE
@@ -82,8 +83,7 @@ class Crew:
             self._changed.notify_all()
             processes = list(self._processes)
         for process in processes:
-            if process.stdin is not None:
-                process.stdin.close()
+            _close(process.stdin)
         for thread in self._threads:
             thread.join()
 
@@ -137,9 +137,17 @@ def _asked(process: subprocess.Popen[str], task: int) -> str:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """Wait for a process that has nothing to read any more, and make it end."""
+    """Leave a process nothing to read, and wait until it has ended."""
+    _close(process.stdin)
     try:
-        process.communicate(timeout=_GRACE_S)
-    except (OSError, ValueError, subprocess.TimeoutExpired):
+        process.wait(timeout=_GRACE_S)
+    except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+    _close(process.stdout)
+
+
+def _close(stream: IO[str] | None) -> None:
+    if stream is not None:
+        with suppress(OSError, ValueError):  # there may be something in it that nobody takes any more
+            stream.close()

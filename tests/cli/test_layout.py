@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -18,7 +19,7 @@ from tcrctl.cli import paper
 from tcrctl.cli.app import main
 from tcrctl.cli.console import has_styles
 from tcrctl.cli.layout import fact, laid_out, message
-from tcrctl.cli.progress import SpokenProgress
+from tcrctl.cli.progress import SpokenProgress, kernels_bar
 from tcrctl.cli.streams import Messages
 from tcrctl.paper.report import Line, make_line
 from tcrctl.paper.table import ROWS
@@ -120,6 +121,26 @@ def test_a_plain_terminal_is_told_ever_more_rarely_how_long_it_takes(capsys):
     lines = capsys.readouterr().err.splitlines()
     assert [line.split(":")[1].split()[0] for line in lines] == ["4", "8", "16", "32", "64"]
     assert lines[1] == "letter_t: 8 of 64, 28 s left"
+
+
+def compiled_on(stream, monkeypatch, **variables):
+    """What a stream is sent while kernels are compiled."""
+    for name, value in {"TERM": "xterm", "NO_COLOR": "", **variables}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys, "stderr", stream)
+    with kernels_bar() as watch:
+        for done in range(5):
+            watch(done, 8, 4.0 - done if done else None)
+    return stream.getvalue()
+
+
+def test_a_terminal_is_told_how_many_kernels_are_compiled_and_what_is_left_and_a_pipe_is_not(monkeypatch):
+    styled = compiled_on(Terminal(), monkeypatch)
+    assert "4/8" in styled
+    assert "0 s left" in styled
+    assert styled.rindex("\x1b[?25h") > styled.rindex("\x1b[?25l")  # the cursor is there again
+    assert compiled_on(io.StringIO(), monkeypatch) == ""
+    assert "\x1b" not in compiled_on(Terminal(), monkeypatch, TERM="dumb")
 
 
 @pytest.fixture(scope="module")
