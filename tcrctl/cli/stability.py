@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcrctl.cli.options import AsJson, Overrides, Quiet, Spec, to_make, unfolded
-from tcrctl.cli.progress import progress_bar
+from tcrctl.cli.progress import kernels_bar, progress_bar
 from tcrctl.visible import cell
 
 if TYPE_CHECKING:
@@ -81,7 +81,8 @@ def stability(
         from tcrctl.experiment.prepare import prepare
         from tcrctl.stability.analysis import analyse
 
-        experiment = prepare(loaded, notify=_nothing if quiet else _say)
+        with kernels_bar(shown=not quiet) as watch:
+            experiment = prepare(loaded, notify=_nothing if quiet else _say, watch=watch)
     with progress_bar(loaded.spec.name, shown=not quiet) as progress:
         report = analyse(experiment, points=where.points, every=where.every, progress=progress)
     if out is not None:

@@ -16,6 +16,8 @@ from tcrctl.paper.checks import CHECKS
 
 #: Folder of the runs below that of the report.
 RUNS: Final = "runs"
+#: An experiment whose kernels most others need.
+_TYPICAL: Final = "cone_frustum"
 
 
 class Job(Protocol):
@@ -79,6 +81,11 @@ def do(order: tuple[Job, Path]) -> Done:
     else:  # a missed criterion is no failure
         reason = "" if code in (0, 3) and result else str(result.get("reason") or f"exit code {code}")
     return Done(job, result, reason, time.monotonic() - begin, code)
+
+
+def warm_up() -> None:
+    """Compile on all cores what most jobs need, before they begin side by side."""
+    prepare(load_spec(_TYPICAL), ahead=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from tcrctl.experiment.headline import count
 from tcrctl.experiment.provenance import versions
 from tcrctl.experiment.run_folder import RunFolder, make_run_folder
 from tcrctl.loop.interruption import Interruption
-from tcrctl.paper.job import Done, Job, do
+from tcrctl.paper.job import Done, Job, do, warm_up
 from tcrctl.paper.over_seeds import STUDIES, over_seeds, run_seeds
 from tcrctl.paper.report import BAD, Line, make_line, markdown
 from tcrctl.paper.row import Row
@@ -211,6 +211,7 @@ def run_jobs(
                 check=interruption.check,
                 begun=lambda order: begun(order[0]),
                 deadline_s=TIME_LIMIT_S,
+                warm=None if where is ALONE else warm_up,
             ):
                 if isinstance(outcome, Crash):
                     outcome = Done(job, {}, outcome.reason, TIME_LIMIT_S, 1)
