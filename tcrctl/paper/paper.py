@@ -171,7 +171,7 @@ def run_paper(
 
     interruption: RunInterruptedError | DeviceError | None = None
     try:
-        for item in run_jobs(jobs_of(rows), folder.path, engine, begun):
+        for item in run_jobs(jobs_of(rows), folder.path, engine, begun, warm_up):
             done[item.job] = item
             ended(item)
     except RunInterruptedError as error:
@@ -187,7 +187,11 @@ def run_paper(
 
 
 def run_jobs(
-    jobs: Sequence[Job], folder: Path, engine: Engine, begun: Callable[[Job], None]
+    jobs: Sequence[Job],
+    folder: Path,
+    engine: Engine,
+    begun: Callable[[Job], None],
+    warm: Callable[[], object] | None = None,
 ) -> Iterator[Done]:
     """Run jobs, last those that need the machine for themselves, one by one; yield what became of each.
 
@@ -196,6 +200,7 @@ def run_jobs(
         folder: Where the jobs write.
         engine: Where the others run.
         begun: Is told when a job begins.
+        warm: Is called before them, where they run side by side.
 
     Raises:
         RunInterruptedError: If a signal came; running jobs were told to stop, and did or were killed.
@@ -211,7 +216,7 @@ def run_jobs(
                 check=interruption.check,
                 begun=lambda order: begun(order[0]),
                 deadline_s=TIME_LIMIT_S,
-                warm=None if where is ALONE else warm_up,
+                warm=None if where is ALONE else warm,
             ):
                 if isinstance(outcome, Crash):
                     outcome = Done(job, {}, outcome.reason, TIME_LIMIT_S, 1)
