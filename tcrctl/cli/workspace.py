@@ -11,7 +11,6 @@ import typer
 
 from tcrctl.cli.layout import message, width
 from tcrctl.cli.options import LOGS, AsJson, Quiet, SideBySide, to_make, unfolded
-from tcrctl.experiment.headline import count
 
 if TYPE_CHECKING:
     from tcrctl.workspace.workspace import Workspace
@@ -89,6 +88,7 @@ def _write(found: Workspace, folder: Path) -> None:
 
 
 def _print(found: Workspace, folder: Path) -> None:
+    from tcrctl.experiment.headline import count
 
     made = found.as_json()
     for axis, span in made["offset"].items():
