@@ -202,7 +202,7 @@ def error_share(rho: float) -> float:
 def try_step(
     model: Model, x: State, speed: Array, h: float, rule: Rule, external: Array, ws: Workspace, s: Scratch
 ) -> tuple[Outcome, float]:
-    """Try an internal step ``h`` [s]; changes ``x`` only if it converges within the bound; returns the error [m]."""
+    """Try an internal step ``h`` [s]; changes ``x`` only if it converges within the bound; returns its error."""
     c = coefficients(rule.rho, h)
     _bars_before(model, x.q, x.v, 0.5 * h, s)
     _begin_cables(model, x, speed, h, x.slip, ws.stretches, s, ws)

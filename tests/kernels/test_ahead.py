@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
@@ -81,19 +83,19 @@ def test_on_one_core_nothing_is_compiled_ahead(program):
 
 @pytest.mark.slow
 def test_two_programs_that_start_at_once_both_fill_the_cache(program):
-    first = start(program)
-    program.python("ahead.py", "2")
-    assert first.communicate(timeout=LIMIT_S)[0].split()[0] == "0"
+    with start(program) as first:
+        program.python("ahead.py", "2")
+        assert first.communicate(timeout=LIMIT_S)[0].split()[0] == "0"
     assert program.lengths()[1] == ""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_whatever_ends_the_program_ends_its_workers_and_leaves_whole_files(program, number):
-    running = start(program)
-    wait_until(lambda: program.kernels or running.poll() is not None)
-    running.send_signal(number)
-    running.wait(LIMIT_S)
+    with start(program) as running:
+        wait_until(lambda: program.kernels or running.poll() is not None)
+        running.send_signal(number)
+        running.wait(LIMIT_S)
     wait_until(lambda: not workers_of(program))
     before = {path: path.read_bytes() for path in program.kernels}
     assert before
@@ -119,8 +121,11 @@ def start(program):
 
 def workers_of(program):
     """Processes that compile for this copy of the program."""
-    found = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
-    return [line for line in found.splitlines() if str(program.package.parent) in line and "worker" in line]
+    lines = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):  # it has just ended
+            lines.append(path.read_bytes().replace(b"\0", b" ").decode(errors="replace"))
+    return [line for line in lines if str(program.package.parent) in line and "worker" in line]
 
 
 def wait_until(holds):

@@ -21,8 +21,10 @@ from tcrctl.experiment.compilation import announced_compilation
 
 def length(_=None):
     s = Stretches(*map(np.zeros, (2, (2, 3), 2, 2, 2, 2, 2, (2, 12))), np.zeros(1, int), *map(np.zeros, (1, 1)))
-    nodes, weights = np.array([[0, 0, 0], [1, 1, 1]]), np.full((2, 3), 1 / 3)
-    measure(np.arange(12.0), np.zeros(1), np.array([0, 2]), nodes, weights, np.ones((1, 4)), s)
+    robot = np.array([0, 2]), np.array([[0, 0, 0], [1, 1, 1]]), np.full((2, 3), 1 / 3), np.ones((1, 4))
+    for part in robot:
+        part.flags.writeable = False  # as in every robot
+    measure(np.arange(12.0), np.zeros(1), *robot, s)
     return float(s.length[1])
 
 if __name__ == "__main__":
