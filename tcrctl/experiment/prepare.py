@@ -28,7 +28,7 @@ from tcrctl.loop.loop import Parts, run_loop, step_count
 from tcrctl.loop.safety import SafetyGuard, SafetyLimits
 from tcrctl.plant.own import OwnPlant
 from tcrctl.plant.plant import Plant, RunnablePlant
-from tcrctl.plant.realistic import rehearsal_plant
+from tcrctl.plant.rehearsal import LOST, RehearsalPlant
 from tcrctl.plant.rig.operation import Operation, unheard
 from tcrctl.plant.settings import PlantSection, RigSettings, SimulatedSettings
 from tcrctl.plant.simulated import SimulatedPlant
@@ -39,8 +39,8 @@ from tcrctl.task.task import Task, build_task, task_targets
 from tcrctl.trajectory.start_blend import StartBlend
 from tcrctl.trajectory.trajectory import Trajectory, build_trajectory
 
-#: Steps of the rehearsal that loads every kernel.
-WARM_UP_STEPS: Final = 3
+#: Steps of a rehearsal.
+WARM_UP_STEPS: Final = len(LOST)
 
 Notify = Callable[[str], None]
 PlantBuilder = Callable[[Any, "Experiment", Operation], tuple[RunnablePlant, TrueState | None]]
@@ -267,8 +267,15 @@ def build_parts(
 
 def _rehearse(experiment: Experiment) -> None:
     """Run a few steps with parts of its own, in simulation, so that nothing of the run itself is touched."""
-    simulated, spec = rehearsal_plant(experiment.spec.plant), experiment.spec
-    plant = SimulatedPlant(simulated, experiment.robot, experiment.period, spec.seed)
+    controller = experiment.spec.controller
+    for settings in (controller, controller.at_once()) if controller.settling else (controller,):
+        spec = experiment.spec.model_copy(update={"controller": settings})
+        _rehearse_at(replace(experiment, spec=spec))
+
+
+def _rehearse_at(experiment: Experiment) -> None:
+    """Run a few steps from where it begins, settling or at once."""
+    plant = RehearsalPlant(experiment.spec.plant, experiment.robot, experiment.period, experiment.spec.seed)
     parts, _ = build_parts(experiment, plant, plant.state)
     metrics, task = Metrics(WARM_UP_STEPS, paced=False), make_task(experiment)
 

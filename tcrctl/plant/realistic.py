@@ -21,7 +21,7 @@ from tcrctl.plant.reality_settings import (
     HysteresisSettings,
     ScatterSettings,
 )
-from tcrctl.plant.settings import PlantSettings, SimulatedSettings
+from tcrctl.plant.settings import SimulatedSettings
 from tcrctl.robot.sections import FrictionSettings
 
 if TYPE_CHECKING:  # numpy is imported where something is drawn: checking a file needs none
@@ -112,12 +112,6 @@ def as_drawn(settings: SimulatedSettings, cables: int, seed: int) -> SimulatedSe
     given = settings.model_fields_set
     left: dict[str, Any] = {name: drawn[name] for name in DRAWN if name not in given}
     return settings.model_copy(update={**left, "realistic_seed": seed})
-
-
-def rehearsal_plant(settings: PlantSettings) -> SimulatedSettings:
-    """Return a plant with ideal parts that runs through the kernels of another one."""
-    friction = settings.friction if isinstance(settings, SimulatedSettings) else None
-    return SimulatedSettings(kind="simulated", friction=friction)
 
 
 def draw(sizes: Sizes, cables: int, seed: int) -> dict[str, Any]:

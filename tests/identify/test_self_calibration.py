@@ -13,7 +13,7 @@ from tcrctl.identify.calibration.design import choose, sensitivities
 from tcrctl.identify.calibration.fit import HALVINGS, Calibrator
 from tcrctl.identify.calibration.judgement import undetermined
 from tcrctl.identify.calibration.loose import hole_forces
-from tcrctl.identify.calibration.rests import Rests, stop
+from tcrctl.identify.calibration.rests import Rests, _ends, stop
 from tcrctl.identify.calibration.robot_values import robot_of
 from tcrctl.identify.calibration.rubbing import behind_play
 from tcrctl.identify.calibration.settings import RestSettings, SelfCalibrationSpec
@@ -271,3 +271,8 @@ def test_a_point_with_friction_is_at_its_edge_after_a_pull_and_near_the_middle_a
     swings = 3e-3 * (1.0 - np.arange(9) / 8) * np.where(np.arange(9) % 2 == 0, 1.0, -1.0)
     assert stop(pull[:, None], 2e-3)[-1, 0] == 1.0
     assert abs(stop(np.concatenate([pull, 5e-3 + swings])[:, None], 2e-3)[-1, 0]) < 0.5
+
+
+@pytest.mark.parametrize("steps", [0, 1])
+def test_a_log_of_a_run_that_never_moved_has_no_rest(steps):
+    assert _ends(np.zeros(steps), np.zeros((steps, 3)), 1.5) == []

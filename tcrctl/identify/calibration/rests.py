@@ -100,6 +100,8 @@ def stop(drive: Array, width: float) -> Array:
 
 def _ends(t: Array, applied: Array, least: float) -> list[int]:
     """Last steps of all rests."""
+    if len(t) < 2:  # a run that was stopped before it moved
+        return []
     moves = np.abs(np.diff(applied, axis=0)).max(axis=1) > STILL
     edges = (np.flatnonzero(moves) + 1).tolist()
     firsts, lasts = [0, *edges], [*(k - 1 for k in edges), len(t) - 1]
