@@ -251,7 +251,8 @@ def build_parts(
     if found is not None:
         offset = float(np.linalg.norm(found[0] - trajectory.position(np.zeros(1))[0]))
         rest = spec.controller.settling
-        trajectory = StartBlend(trajectory, *found, spec.start.blend_s, spec.start.approach, rest)
+        start, drive = spec.start, frames[-1].drive
+        trajectory = StartBlend(trajectory, *found, start.blend_s, start.approach, rest, drive)
     parts = Parts(
         trajectory=trajectory,
         plant=plant,

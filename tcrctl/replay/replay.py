@@ -140,7 +140,15 @@ class _Replay:
         trajectory = make_trajectory(recorded, self.robot)
         normal = self.robot.rest_normal if first.reference.normal is None else first.reference.normal
         start, rest = recorded.start, recorded.controller.settling
-        return StartBlend(trajectory, first.reference.position, normal, start.blend_s, start.approach, rest)
+        return StartBlend(
+            trajectory,
+            first.reference.position,
+            normal,
+            start.blend_s,
+            start.approach,
+            rest,
+            first.reference.drive,
+        )
 
     def run(self, record: Record | None, progress: Progress) -> RecordingEndedError | str:
         """Replay to the end of the window or of what there is; return why it ended."""

@@ -26,7 +26,8 @@ class StartBlend:
     """A trajectory plus the offset of the robot's start pose, which fades out within ``blend`` [s].
 
     A real robot at rest stands a millimetre or a degree beside its model. Without this, every run would begin
-    with a step of the reference, and a step excites the slow modes.
+    with a step of the reference, and a step excites the slow modes. The same holds for drives that a trajectory
+    moves, wherever the run before has left them.
 
     A robot that stands so far away that fading would be faster than ``speed``, for instance where the run before
     has left it, first goes to the start of the trajectory, as slowly as that.
@@ -45,6 +46,7 @@ class StartBlend:
         blend: float,
         speed: float = np.inf,
         rest: float = 0.0,
+        drive: Array | None = None,
     ) -> None:
         """Take up a trajectory.
 
@@ -56,12 +58,16 @@ class StartBlend:
             speed: Largest speed at which the offset may fade out while the trajectory goes on [m/s].
             rest: Time in which the robot is left where it is before anything begins [s]; it counts only if there
                 is a blend.
+            drive: Drive lengths before the first step (m,) [m], for a trajectory that gives some.
         """
         self._trajectory = trajectory
         self.rest = rest if blend > 0.0 else 0.0
         zero = np.zeros(1)
         self._offset = position - trajectory.position(zero)[0]
-        needed = STEEPEST * float(np.linalg.norm(self._offset)) / speed
+        self._drives = self._beside(drive)
+        needed = (
+            STEEPEST * max(float(np.linalg.norm(self._offset)), float(np.abs(self._drives).max())) / speed
+        )
         self.approach = needed if needed > blend > 0.0 else 0.0
         self._fading = self.approach or blend
         wanted = trajectory.normal(zero)
@@ -90,8 +96,16 @@ class StartBlend:
         return None if wanted is None else _turned(wanted, self._left(t)[:, None] * self._turn)
 
     def drive(self, t: Array) -> Array | None:
-        """Return the trajectory's drive lengths at times t (n,) [s] as (n, m) [m], or None; no offset on them."""
-        return drives_of(self._trajectory, self._since(t))
+        """Return the trajectory's drive lengths at times t (n,) [s] as (n, m) [m], or None."""
+        wanted = drives_of(self._trajectory, self._since(t))
+        return None if wanted is None else wanted + self._left(t)[:, None] * self._drives
+
+    def _beside(self, drive: Array | None) -> Array:
+        """Return how far drives (m,) are beside the trajectory's first lengths (m,) [m]; zero if unknown."""
+        wanted = drives_of(self._trajectory, np.zeros(1))
+        if wanted is None or drive is None or not np.isfinite(drive).all():
+            return np.zeros(1)
+        return np.asarray(drive - wanted[0])
 
     def _since(self, t: Array) -> Array:
         """Return times of the trajectory at times t (n,) of the run."""

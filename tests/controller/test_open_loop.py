@@ -151,12 +151,30 @@ def test_drives_that_lag_and_answer_late_are_not_chased(tmp_path):
     assert np.abs(told[1]["measurement_drive"][-1] - told[1]["applied_drive"][-1]).max() < 1e-4
 
 
-def test_the_start_blend_leaves_the_drives_alone(robot, trajectory):
+def test_the_start_blend_leaves_drives_alone_that_are_where_they_should_be(robot, trajectory):
     blended = StartBlend(trajectory, robot.rest_position + 1e-3, robot.rest_normal, 2.0)
     t = np.linspace(0.0, 7.5, 20)
     assert np.array_equal(blended.drive(t), trajectory.drive(t))
     reference = sample_reference(blended, 2.0, at(2.05))
     assert np.array_equal(reference.drive, trajectory.drive(at(2.05))[0])
+
+
+def test_drives_that_were_left_elsewhere_go_to_the_start_no_faster_than_they_may(robot, trajectory):
+    """Not at once, in one step: that threw the robot, and its cables were told to be taut to bursting."""
+    start, beside = trajectory.drive(np.zeros(1))[0], np.array([-0.011, -0.019, 0.004])
+    blended = StartBlend(
+        trajectory, robot.rest_position, robot.rest_normal, 1.0, speed=0.01, drive=start + beside
+    )
+    assert blended.approach > 1.0
+    t = np.linspace(0.0, blended.approach, 2001)
+    way = blended.drive(t)
+    np.testing.assert_allclose(way[[0, -1]], [start + beside, start], atol=1e-12)
+    speed = np.abs(np.diff(way, axis=0)).max() / (t[1] - t[0])
+    assert 0.0099 < speed < 0.01 + 1e-9
+    later = np.linspace(0.0, 5.0, 7)
+    np.testing.assert_allclose(blended.drive(blended.approach + later), trajectory.drive(later), atol=1e-12)
+    lost = StartBlend(trajectory, robot.rest_position, robot.rest_normal, 1.0, drive=np.full(3, np.nan))
+    assert np.array_equal(lost.drive(later), trajectory.drive(later))
 
 
 def test_trajectories_without_drives_give_none_and_the_controller_says_so(robot):
