@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from tcrctl.experiment.prepare import build_parts, build_plant, prepare
 from tcrctl.experiment.run import run_experiment
 from tcrctl.experiment.spec import load_spec
 from tcrctl.identify.calibration.files import CALIBRATION, REPORT, write_calibration
+from tcrctl.identify.calibration.rests import read_rests
+from tcrctl.identify.calibration.rubbing import Pulls
 from tcrctl.identify.calibration.self_calibration import calibrate
 from tcrctl.identify.calibration.settings import SelfCalibrationSpec
 from tcrctl.log.file_names import CAMERAS
@@ -78,6 +81,21 @@ def test_the_frame_of_the_cameras_is_found(found):
 def test_the_lag_of_the_drives_is_found(found):
     assert found[0].result.drives.lag == pytest.approx(0.03, abs=2e-3)
     assert found[0].result.drives.dead_time == pytest.approx(0.0, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_pulls_count_beside_the_first_rest_wherever_that_came_from(found):
+    """On a bench a run before may have left the drives elsewhere: the first rest comes after a pull, too."""
+    calibrated = found[0]
+    settings, x = calibrated.spec.rest, calibrated.result.fit.x
+    rests = read_rests(calibrated.log, settings)
+    slid = rests.slid.copy()
+    slid[0] = 1.0
+    left = [
+        Pulls(calibrated.log, which, calibrated.body, x, settings).left(np.zeros(4))
+        for which in (rests, replace(rests, slid=slid))
+    ]
+    np.testing.assert_array_equal(*left)
 
 
 @pytest.mark.slow

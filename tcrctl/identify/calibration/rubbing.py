@@ -64,7 +64,8 @@ class Pulls:
 
     def __init__(self, log: Log, rests: Rests, body: Body, x: Array, settings: RestSettings) -> None:
         columns = log.columns(("t", "measurement_drive"))
-        pulled = np.setdiff1d(np.arange(len(rests.t)), rests.shaken)
+        later = np.arange(1, len(rests.t))  # beside the first one, after a pull or not
+        pulled = np.setdiff1d(later, rests.shaken)
         self._which: NDArray[np.intp] = np.concatenate([[0], pulled]) if pulled.size else pulled
         self._body, self._x, self._settings, self._rests = body, x, settings, rests
         last = 0 if not pulled.size else int(np.searchsorted(columns["t"], rests.t[pulled[-1]]))
