@@ -27,7 +27,7 @@ def carry(before: Array, now: Array, seen: NDArray[np.bool_], known: NDArray[np.
         seen: Which markers this frame has (n_markers,).
         known: Which markers have ever been seen (n_markers,); rings that were never whole neither move nor carry.
     """
-    turn, old, new = np.eye(3), np.zeros(3), np.zeros(3)  # the base does not move
+    turn, old, new = _unturned(), np.zeros(3), np.zeros(3)  # the base does not move
     for first in range(0, seen.size, RING):
         if not (known[first] and known[first + 1] and known[first + 2]):
             continue
@@ -35,11 +35,11 @@ def carry(before: Array, now: Array, seen: NDArray[np.bool_], known: NDArray[np.
         there = seen[first : first + RING]
         carried = np.empty((RING, 3))
         for i in range(RING):
-            carried[i] = _moved(turn, old, new, ring[i])
+            _move(turn, old, new, ring[i], carried[i])
         _meet(carried, found, there)
         for i in range(RING):
-            if not there[i]:
-                found[i] = carried[i]
+            for j in range(3):
+                found[i, j] = found[i, j] if there[i] else carried[i, j]
         turn, old, new = _turn(axes_of(ring), axes_of(found)), centre_of(ring), centre_of(found)
 
 
@@ -52,23 +52,34 @@ def _meet(carried: Array, found: Array, there: NDArray[np.bool_]) -> None:
             count, old, new = count + 1, old + carried[i], new + found[i]
     if count == 0:
         return
-    old, new, turn = old / count, new / count, np.eye(3)
+    old, new, turn = old / count, new / count, _unturned()
     if count == RING - 1:
         a, b = (0 if there[0] else 1), (2 if there[2] else 1)
         was, is_now = carried[b] - carried[a], found[b] - found[a]
         turn = matrix_from_quaternion(rotation_between(was / norm(was), is_now / norm(is_now)))
+    point = np.empty(3)
     for i in range(RING):
-        carried[i] = _moved(turn, old, new, carried[i])
+        for j in range(3):
+            point[j] = carried[i, j]
+        _move(turn, old, new, point, carried[i])
 
 
 @part()
-def _moved(turn: Array, old: Array, new: Array, point: Array) -> Array:
-    """Return a point that a turn about ``old`` and the shift of ``old`` to ``new`` have moved."""
-    moved = new.copy()
-    for i in range(3):
+def _move(turn: Array, old: Array, new: Array, point: Array, moved: Array) -> None:
+    """Put a point that a turn about ``old`` and the shift of ``old`` to ``new`` move where it then is."""
+    for i in range(3):  # element by element: an assignment of rows would compile its error message, too
+        moved[i] = new[i]
         for j in range(3):
             moved[i] += turn[i, j] * (point[j] - old[j])
-    return moved
+
+
+@part()
+def _unturned() -> Array:
+    """Return the rotation (3, 3) that leaves everything as it is."""
+    turn = np.zeros((3, 3))
+    for i in range(3):
+        turn[i, i] = 1.0
+    return turn
 
 
 @part()
