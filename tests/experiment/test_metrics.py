@@ -124,7 +124,7 @@ def test_the_length_of_a_paced_run_is_that_of_the_clock():
     assert measures(steps[:3]).duration_s == pytest.approx(3 * period + 9.0)
 
 
-@pytest.mark.parametrize(("late", "words"), [(1, "steps, 5 %"), (9, "45 %")])
+@pytest.mark.parametrize(("late", "words"), [(1, "step, 5 %"), (9, "45 %")])
 def test_a_summary_says_how_many_steps_were_overruns_and_they_can_be_a_criterion(late, words):
     timings = [Timing(0.0, 0.0, 0.0, 0.0, 1.1 * records.PERIOD_S * (k < late)) for k in range(20)]
     made = summary(

@@ -107,7 +107,7 @@ REFUSED = {
     ),
     "raises later": ("(0.5 - t)", "math.sqrt(0.3 - t)", "(path.py:5) at t = 0.3 s"),
     "NaN": ("0.0, 1e-4", "math.nan, 1e-4", "returned values that are no finite numbers at t = 0 s"),
-    "two numbers": ("0.0, 1e-4 *", "1e-4 *", "returned shape (2,) at t = 0 s It must be the end position"),
+    "two numbers": ("0.0, 1e-4 *", "1e-4 *", "returned shape (2,) at t = 0 s. It must be the end position"),
     "nothing": ("return", "_ =", "returned shape () at t = 0 s"),
     "text": ("0.0, 1e-4", "'a', 1e-4", "returned no numbers at t = 0 s"),
     "no function": ("def path", "def curve", "it defines no function path"),
