@@ -114,7 +114,7 @@ class PlcBus:
             PlcMismatchError: It is not the PLC of this register map.
         """
         self.close()
-        with self._link.patience(OPENING_S, self._settings.retries):
+        with self._link.patience(OPENING_S, max(1, self._settings.retries)):
             self._link.open()
             try:
                 self._info = self._find_out()
