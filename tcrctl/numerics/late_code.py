@@ -4,6 +4,9 @@ numba optimises every kernel together with all that it calls, and translates tha
 that only kernels call nobody ever runs it: callers link its bitcode, optimise and translate it again. Without that
 a cold start takes three quarters of the time; what Python calls is made as ever, to the bit.
 
+Of a kernel that is kept with its machine code the bitcode is read when a kernel that calls it is compiled: a run that
+compiles nothing needs none of it.
+
 The names of numba used here are not public. Where one of them is missing, numba works as it always does.
 """
 
@@ -12,12 +15,14 @@ from __future__ import annotations
 from functools import cache
 from typing import Any, Final
 
+from llvmlite import binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.registry import cpu_target
 
 _NEEDED: Final = (
     "_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals", "_unserialize",
     "get_pointer_to_function", "serialize_using_object_code", "serialize_using_bitcode",
+    "_get_module_for_linking", "_set_compiled_object",
 )  # fmt: skip
 
 
@@ -37,10 +42,17 @@ class _LateLibrary(JITCodeLibrary):  # type: ignore[misc,unused-ignore]
     """What one kernel became, with all that it calls."""
 
     _made = False
+    #: Machine code and bitcode of a kernel that was kept, as long as nobody has read the bitcode.
+    _kept: tuple[bytes, bytes] | None = None
 
     def get_pointer_to_function(self, name: str) -> int:
         """Return the address of a function, 0 if it is not defined here."""
         self._ensure_finalized()
+        if self._kept is not None:
+            if name.encode() in self._kept[0]:  # among its symbols, all of which could be linked
+                known: int = self._codegen._engine.get_function_address(name)
+                return known
+            self._get_module_for_linking()
         if not self._made:
             if not _defines(self._final_module, name):
                 return 0
@@ -66,11 +78,23 @@ class _LateLibrary(JITCodeLibrary):  # type: ignore[misc,unused-ignore]
         super()._finalize_final_module()
         _environments(self._codegen).set_late(self._final_module)
 
+    def _get_module_for_linking(self) -> Any:
+        if self._kept is not None:
+            self._shared_module = llvm.parse_bitcode(self._kept[1])
+            self._codegen._engine._load_defined_symbols(self._shared_module)
+            self._kept = None
+        return super()._get_module_for_linking()
+
     @classmethod
     def _unserialize(cls, codegen: Any, state: Any) -> Any:
-        library = super()._unserialize(codegen, state)
-        if state[1] == "object":
-            library._make()
+        name, kind, kept = state
+        if kind != "object":
+            return super()._unserialize(codegen, state)
+        library = codegen.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(kept[0])
+        library._kept = kept
+        library._make()
         return library
 
 

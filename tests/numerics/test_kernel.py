@@ -110,3 +110,34 @@ def test_a_numba_with_other_names_works_as_it_always_does(tmp_path, monkeypatch)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     done = subprocess.run([sys.executable, "-c", OLDER_NUMBA], capture_output=True, text=True, check=True)
     assert float(done.stdout) == pytest.approx(np.pi / 2)
+
+
+KEPT = """
+import numpy as np
+from numba import njit
+from tcrctl.numerics.rotation import angle_between
+
+x, y = np.eye(3)[0], np.eye(3)[1]
+first = angle_between(x, y)
+library, = (found.library for found in angle_between.overloads.values())
+kept = library._kept is not None
+
+@njit
+def twice(x, y):
+    return 2.0 * angle_between(x, y)
+
+second = twice(x, y)
+assert library._kept is None
+assert library.get_pointer_to_function("nowhere_defined") == 0
+print(kept, first, second, angle_between(x, y))
+"""
+
+
+@pytest.mark.slow
+def test_the_bitcode_of_a_kept_kernel_is_read_by_who_calls_it_and_no_run_needs_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    for was_kept in ("False", "True"):
+        done = subprocess.run([sys.executable, "-c", KEPT], capture_output=True, text=True, check=True)
+        kept, *angles = done.stdout.split()
+        assert kept == was_kept
+        assert [float(a) for a in angles] == pytest.approx([np.pi / 2, np.pi, np.pi / 2])
