@@ -4,8 +4,8 @@ numba optimises every kernel together with all that it calls, and translates tha
 that only kernels call nobody ever runs it: callers link its bitcode, optimise and translate it again. Without that
 a cold start takes three quarters of the time; what Python calls is made as ever, to the bit.
 
-Of a kernel that is kept with its machine code the bitcode is read when a kernel that calls it is compiled: a run that
-compiles nothing needs none of it.
+Of a kernel that is kept with its machine code the bitcode is read when a kernel that calls it is compiled: a run
+that compiles nothing needs none of it.
 
 The names of numba used here are not public. Where one of them is missing, numba works as it always does.
 """
