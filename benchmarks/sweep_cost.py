@@ -1,6 +1,6 @@
-"""What a study costs beyond its runs, what a second process is worth, and how its memory grows.
+"""What a study costs, and beyond its runs, what a second process is worth, and how its memory grows.
 
-    taskset -c 0,1 python benchmarks/sweep_cost.py [--runs 20] [--spec letter_t]
+    taskset -c 0,1 python benchmarks/sweep_cost.py [--runs 20] [--spec letter_t] [--set plant.step_ms=auto]
 
 On an otherwise idle computer. Overhead is wall time with one process, less start-up, over the sum of the runs' own
 seconds; speed-up is the ratio of the wall times of two and one processes.
@@ -35,8 +35,9 @@ def main() -> None:
     )
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--spec", default="letter_t")
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE")
     told = parser.parse_args()
-    study = told_study(told.spec, (), {"seeds": f"0..{told.runs - 1}"})
+    study = told_study(told.spec, told.set, {"seeds": f"0..{told.runs - 1}"})
     runs, walls = planned(study), {}
     for jobs in (1, 2):
         marks, memory = [time.perf_counter()], [memory_mb()]
@@ -57,6 +58,7 @@ def main() -> None:
             flush=True,
         )
     per_run = walls[1] / (told.runs - 1), walls[2] / (told.runs - 2)
+    print(f"runs a minute and core: {60.0 / per_run[0]:.1f}")
     print(f"speed-up of two processes over one: {per_run[0] / per_run[1]:.2f}")
 
 
