@@ -14,8 +14,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
@@ -70,7 +68,10 @@ def with_lag(change: Array, step: float, drives: DriveLag, behind: Array, queue:
         behind: p (m,) [m].
         queue: w (m,) [m].
     """
-    if drives.lag == 0.0 and drives.dead_time == 0.0 and not np.any(behind):
+    prompt = drives.lag == 0.0 and drives.dead_time == 0.0
+    for way in behind:
+        prompt = prompt and way == 0.0
+    if prompt:
         return
     n_steps, rows, m = change.shape[0], change.shape[1], change.shape[2] - 1
     slow = change[:, :, :m].copy()

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tcrctl.controller.prediction_settings import RestGainSettings
+from tcrctl.numerics.copies import copy_vector, scale_rows
 from tcrctl.numerics.kernel import part
 from tcrctl.robot.module import FIXED, RING
 from tcrctl.signals import Array
@@ -81,7 +82,7 @@ def gain_learning(settings: RestGainSettings | None, blend: float, period: float
 def rest(known: RestGain, numbers: GainLearning, drive: Array, blend: float) -> None:
     """Begin where the robot rests at a drive (m,) [m]: nothing is known of G, and Δ as well as ever."""
     m = drive.shape[0]
-    known.drive[:] = drive
+    copy_vector(drive, known.drive)
     known.covariance[:] = 0.0
     known.covariance[0, 0] = blend
     for c in range(1, m + 1):
@@ -112,7 +113,7 @@ def carry(known: RestGain, numbers: GainLearning, drive: Array, offset: Array, t
     for c in range(m):
         P[0, 1 + c] += across[c]
         P[1 + c, 0] = P[0, 1 + c]
-    known.drive[:] = drive
+    copy_vector(drive, known.drive)
     _fade(known, numbers)
 
 
@@ -120,7 +121,7 @@ def carry(known: RestGain, numbers: GainLearning, drive: Array, offset: Array, t
 def _fade(known: RestGain, numbers: GainLearning) -> None:
     """Forget a part of G: P goes towards that of nothing known."""
     left, P = 1.0 - numbers.fade, known.covariance
-    known.gain[:] *= left
+    scale_rows(known.gain, left)
     for c in range(1, P.shape[0]):
         P[0, c] *= left
         P[c, 0] *= left
@@ -172,4 +173,5 @@ def _bound(known: RestGain, numbers: GainLearning, tip: int) -> None:
     for c in range(end.shape[1]):
         size = math.sqrt(end[0, c] ** 2 + end[1, c] ** 2 + end[2, c] ** 2)
         if size > numbers.most:
-            known.gain[:, c] *= numbers.most / size
+            for k in range(known.gain.shape[0]):
+                known.gain[k, c] *= numbers.most / size

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.numerics.copies import copy_vector
 from tcrctl.numerics.kernel import kernel, part
 from tcrctl.robot import pose
 from tcrctl.robot.dynamics import Scratch, lengths_before
@@ -165,9 +166,9 @@ def update(
     if outcome.converged:
         for k in range(q.shape[0]):
             v[k] = (q[k] - before.q[k]) / numbers.period
-        drive[:] = frame.drive
+        copy_vector(frame.drive, drive)
     else:
-        q[:] = before.q
+        copy_vector(before.q, q)
     end, disturbance = _end(q, numbers.tip), np.empty(q.shape[0])
     tip_seen = _correct(frame, numbers, end, correction, blend)
     for k in range(q.shape[0]):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcrctl.numerics.copies import copy_rows
 from tcrctl.numerics.kernel import part
 from tcrctl.signals import Array
 
@@ -54,5 +55,5 @@ def orthonormalise(V: Array, MV: Array) -> Array:
     second = _inverse_factor(np.dot(once.T, np.dot(MV, first)))
     T: Array = np.dot(first, second)
     np.dot(once, second, V)
-    MV[:] = np.dot(MV, T)
+    copy_rows(np.dot(MV, T), MV)
     return T

@@ -38,8 +38,16 @@ class Shape(NamedTuple):
 @kernel(error_model="numpy")
 def change_since(start: Shape, now: Shape) -> Shape:
     """Return the change from one shape to another; twists by the shorter way."""
-    twist = np.mod(now.twist - start.twist + np.pi, 2.0 * np.pi) - np.pi
-    return Shape(now.side - start.side, now.offset - start.offset, twist, now.bend - start.bend)
+    n = now.twist.shape[0]
+    change = Shape(np.empty((n, 3)), np.empty((n, 3)), np.empty(n), np.empty((n, 2)))
+    for i in range(n):
+        change.twist[i] = np.mod(now.twist[i] - start.twist[i] + np.pi, 2.0 * np.pi) - np.pi
+        for k in range(3):
+            change.side[i, k] = now.side[i, k] - start.side[i, k]
+            change.offset[i, k] = now.offset[i, k] - start.offset[i, k]
+        for k in range(2):
+            change.bend[i, k] = now.bend[i, k] - start.bend[i, k]
+    return change
 
 
 @part(error_model="numpy")
@@ -89,6 +97,21 @@ def measure(
 @kernel(error_model="numpy")
 def typical_change(now: Array, before: Array) -> float:
     """Return the median of how much values (n, 3) have changed, of those that are known; NaN if none is."""
-    change = np.abs(now - before).ravel()
-    known = change[change == change]
-    return float(np.median(known)) if len(known) else np.nan
+    changes, count = np.empty(now.size), 0
+    for i in range(now.shape[0]):
+        for j in range(now.shape[1]):
+            change = abs(now[i, j] - before[i, j])
+            if change == change:
+                _insert(changes, count, change)
+                count += 1
+    return 0.5 * (changes[(count - 1) // 2] + changes[count // 2]) if count else np.nan
+
+
+@part(error_model="numpy")
+def _insert(ordered: Array, count: int, value: float) -> None:
+    """Put a value where it belongs among the first ``count`` of an array; numpy's median compiles for a second."""
+    place = count
+    while place > 0 and ordered[place - 1] > value:
+        ordered[place] = ordered[place - 1]
+        place -= 1
+    ordered[place] = value

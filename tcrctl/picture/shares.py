@@ -146,8 +146,10 @@ def _known(share: float) -> float:
 @kernel(error_model="numpy")
 def is_strange(start: Shape, now: Shape, limits: Limits, noise: float) -> bool:
     """Return whether anything has changed by more than it can since the start."""
-    change = change_since(start, now)
-    if (side_shares(change, limits, noise) > 1.0).any():
-        return True
+    change, worst = change_since(start, now), 0.0
+    for share in side_shares(change, limits, noise).ravel():
+        worst = max(worst, share)
     sideways, along, twist = joints(change, limits, noise)
-    return bool((np.maximum(np.hypot(sideways, along), twist) > 1.0).any())
+    for i in range(len(twist)):
+        worst = max(worst, np.hypot(sideways[i], along[i]), twist[i])
+    return worst > 1.0

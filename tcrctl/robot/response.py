@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tcrctl.numerics.copies import copy_rows, copy_vector, scale_rows
 from tcrctl.numerics.kernel import part
 from tcrctl.robot import pose
 from tcrctl.robot.equations import Workspace
@@ -80,9 +81,9 @@ def _pull(model: Model, ws: Workspace, V: Array, lengths: Array, drag: Drag, h: 
             pull.growing[i, c] = -ws.axial[c] * lengths[c, i]
     if drags:
         project_drag(model, drag.holes, V, pull.drag, pull.steady)
-        pull.drag[:] *= turned
-        pull.steady[:] *= turned
-        pull.held[:, m] = np.dot(V.T, drag.held)
+        scale_rows(pull.drag, turned)
+        scale_rows(pull.steady, turned)
+        copy_vector(np.dot(V.T, drag.held), pull.held[:, m])
     return pull
 
 
@@ -94,7 +95,10 @@ def _pull_further(reduced: Reduced, gain: Array, pull: Pull) -> Array:
     is no tension, because the cables of the robot are as long as their drives say.
     """
     further = np.dot(reduced.weighted.T, gain)
-    pull.growing[:, : gain.shape[1]] += np.dot(reduced.stiffness, further)
+    force = np.dot(reduced.stiffness, further)
+    for i in range(force.shape[0]):
+        for c in range(force.shape[1]):
+            pull.growing[i, c] += force[i, c]
     lengths: Array = np.dot(reduced.lengths, further)
     return lengths
 
@@ -160,13 +164,17 @@ def respond(
         return change, False
     C = _output_rows(q_eq, tip, V, reduced.lengths)
     x, vx, start = np.zeros((V.shape[1], m + 1)), np.zeros((V.shape[1], m + 1)), np.empty(change.shape[1:])
-    x[:, m] = np.dot(reduced.weighted.T, release.offset[3 * FIXED :])  # the part that the basis shows
-    vx[:, m] = np.dot(reduced.weighted.T, release.v[3 * FIXED :])
+    copy_vector(
+        np.dot(reduced.weighted.T, release.offset[3 * FIXED :]), x[:, m]
+    )  # what the basis shows of it
+    copy_vector(np.dot(reduced.weighted.T, release.v[3 * FIXED :]), vx[:, m])
     _observe(C, ws.axial, unseen, 0.0, x, start)
     for n in range(change.shape[0]):
         step(stepping, n * h, pull, x, vx)
         _observe(C, ws.axial, unseen, n * h + h, x, change[n])
-        change[n] -= start
+        for i in range(start.shape[0]):
+            for c in range(start.shape[1]):
+                change[n, i, c] -= start[i, c]
     return change, True
 
 
@@ -175,5 +183,5 @@ def _output_rows(q_eq: Array, tip: int, V: Array, lengths: Array) -> Array:
     """Return end pose and cable lengths by the reduced positions (7 + m, r)."""
     first, C = 3 * (tip - FIXED), np.empty((POSE_ROWS + lengths.shape[0], V.shape[1]))
     np.dot(pose.output_matrix(q_eq, tip), V[first : first + 9], C[:POSE_ROWS])
-    C[POSE_ROWS:] = lengths
+    copy_rows(lengths, C[POSE_ROWS:])
     return C

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tcrctl.elements.sliding_cable import STIFFNESS
+from tcrctl.numerics.copies import copy_rows
 from tcrctl.numerics.kernel import kernel, part
 from tcrctl.numerics.orthonormal import orthonormalise
 from tcrctl.robot import linear
@@ -69,7 +70,7 @@ def refine_basis(model: Model, ws: Workspace, V: Array) -> Reduced:
     for k in range(V.shape[0]):
         for c in range(m):
             B[k, modes + c] = ws.axial[c] * ws.G[c, 3 * FIXED + k]
-    V[:] = B
+    copy_rows(B, V)
     linear.solve_many(ws, V)
     mass_columns(model.mass, V, weighted)
     T = orthonormalise(V, weighted)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcrctl.numerics.copies import copy_vector
 from tcrctl.numerics.kernel import part
 from tcrctl.numerics.rotation import cross, norm
 from tcrctl.robot.module import RING
@@ -20,20 +21,24 @@ def ring_frames(nodes: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
-@part()
+@part(error_model="numpy")
 def axes_of(ring: Array) -> Array:
     """Return those of one ring (3, 3), one per row, from its nodes (3, 3), in a kernel; NaN if it has none."""
-    side = ring[1] - ring[0]
-    normal = cross(side, ring[2] - ring[0])
-    axes = np.empty((3, 3))
-    axes[0] = side / norm(side)
-    axes[2] = normal / norm(normal)
-    axes[1] = cross(axes[2], axes[0])
+    side, other = np.empty(3), np.empty(3)
+    for i in range(3):  # element by element, in all kernels of one picture: half a second to compile less
+        side[i], other[i] = ring[1, i] - ring[0, i], ring[2, i] - ring[0, i]
+    normal, axes = cross(side, other), np.empty((3, 3))
+    width, area = norm(side), norm(normal)
+    for i in range(3):
+        axes[0, i], axes[2, i] = side[i] / width, normal[i] / area
+    copy_vector(cross(axes[2], axes[0]), axes[1])
     return axes
 
 
 @part()
 def centre_of(ring: Array) -> Array:
     """Return the centre of one ring (3,) [m] from its nodes (3, 3)."""
-    centre: Array = (ring[0] + ring[1] + ring[2]) / RING
+    centre = np.empty(3)
+    for i in range(3):
+        centre[i] = (ring[0, i] + ring[1, i] + ring[2, i]) / RING
     return centre

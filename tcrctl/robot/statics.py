@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tcrctl.elements.sliding_cable import STIFFNESS
+from tcrctl.numerics.copies import copy_rows, copy_vector
 from tcrctl.numerics.kernel import kernel
 from tcrctl.robot import linear, pose
 from tcrctl.robot.equations import Load, Workspace
@@ -67,7 +68,8 @@ def follow(model: Model, load: Load, ws: Workspace, at: StaticMap, drive: Array,
             q[3 * FIXED + k] += at.gain[k, c] * (drive[c] - at.drive[c])
     outcome = minimise(model, q, drive, load, ws, tolerance, int(MAX_ITERATIONS), bool(1))
     if outcome.converged:
-        at.equilibrium[:], at.drive[:] = q, drive
+        copy_vector(q, at.equilibrium)
+        copy_vector(drive, at.drive)
         linear.couple(ws, ws.r)
         linear.drive_gain(ws, at.gain)
     return outcome
@@ -87,15 +89,15 @@ def static_outputs(model: Model, ws: Workspace, at: StaticMap, tip: int) -> tupl
     """
     m, first = model.cables.shape[0], 3 * (tip - FIXED)
     rest, gain = np.empty(POSE_ROWS + m), np.empty((POSE_ROWS + m, m))
-    rest[:3] = pose.position(at.equilibrium, tip)
-    rest[3:6] = pose.normal(at.equilibrium, tip)
+    copy_vector(pose.position(at.equilibrium, tip), rest[:3])
+    copy_vector(pose.normal(at.equilibrium, tip), rest[3:6])
     rest[6] = pose.twist(at.equilibrium, tip)
-    rest[POSE_ROWS:] = ws.tension
+    copy_vector(ws.tension, rest[POSE_ROWS:])
     for c in range(m):
         ws.axial[c] = model.cables[c, STIFFNESS]
     linear.couple(ws, ws.r)
     answer = np.empty((ws.r.shape[0], m))
     linear.drive_gain(ws, answer)
-    gain[:POSE_ROWS] = np.dot(pose.output_matrix(at.equilibrium, tip), answer[first : first + 9])
-    gain[POSE_ROWS:] = linear.tension_gain(ws, answer)
+    copy_rows(np.dot(pose.output_matrix(at.equilibrium, tip), answer[first : first + 9]), gain[:POSE_ROWS])
+    copy_rows(linear.tension_gain(ws, answer), gain[POSE_ROWS:])
     return rest, gain
