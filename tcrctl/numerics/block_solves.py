@@ -51,7 +51,7 @@ def backward_columns(U: Array, X: Array) -> None:
 def transposed_vector(U: Array, x: Array) -> None:
     """Overwrite ``x`` (b,) by U'^-1 x with U upper triangular (b, b)."""
     for k in range(x.shape[0]):
-        value = x[k] / U[k, k]
+        value = x[k] * (1.0 / U[k, k])
         x[k] = value
         for i in range(k + 1, x.shape[0]):
             x[i] -= U[k, i] * value
@@ -64,7 +64,7 @@ def upper_vector(U: Array, x: Array) -> None:
         value = x[k]
         for i in range(k + 1, x.shape[0]):
             value -= U[k, i] * x[i]
-        x[k] = value / U[k, k]
+        x[k] = value * (1.0 / U[k, k])
 
 
 @part(error_model="numpy")
@@ -85,11 +85,13 @@ def forward_vector(U: Array, x: Array) -> None:
 def backward_vector(U: Array, x: Array) -> None:
     """Overwrite ``x`` (n b,) by U^-1 x."""
     n, bands, b = U.shape[0], U.shape[1], U.shape[2]
-    product = np.empty(b)
     for j in range(n - 1, -1, -1):
         here = x[j * b : (j + 1) * b]
         for d in range(1, min(bands, n - j)):
-            np.dot(U[j, d], x[(j + d) * b : (j + d + 1) * b], product)
+            there, block = x[(j + d) * b : (j + d + 1) * b], U[j, d]
             for i in range(b):
-                here[i] -= product[i]
+                value = here[i]
+                for k in range(b):
+                    value -= block[i, k] * there[k]
+                here[i] = value
         upper_vector(U[j, 0], here)

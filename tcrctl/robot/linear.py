@@ -105,23 +105,20 @@ def couple(ws: Workspace, b: Array) -> None:
 
 
 @part(error_model="numpy")
-def _finish(ws: Workspace, X: Array) -> None:
-    """Overwrite X (n_free, r) by U^-1 (I - W P^-1 W') X."""
-    m = ws.axial.shape[0]
-    size = X.shape[0]
-    r = X.shape[1]
-    weight = np.zeros((m, r))
-    for k in range(size):
+def _finish(ws: Workspace, x: Array) -> None:
+    """Overwrite x (n_free,) by U^-1 (I - W P^-1 W') x."""
+    m, columns = ws.axial.shape[0], ws.columns
+    weight = np.zeros(columns.shape[1])
+    for k in range(x.shape[0]):
+        for c in range(weight.shape[0]):
+            weight[c] += columns[k, c] * x[k]
+    block_solves.transposed_vector(ws.small, weight[:m])
+    block_solves.upper_vector(ws.small, weight[:m])
+    weight[m:] = 0.0  # of the right-hand side that lies beside the cables' columns
+    for k in range(x.shape[0]):
         for c in range(m):
-            for j in range(r):
-                weight[c, j] += ws.columns[k, c] * X[k, j]
-    block_banded.solve_transposed(ws.small, weight)
-    block_banded.solve_upper(ws.small, weight)
-    for k in range(size):
-        for c in range(m):
-            for j in range(r):
-                X[k, j] -= ws.columns[k, c] * weight[c, j]
-    block_banded.solve_backward(ws.U, X)
+            x[k] -= columns[k, c] * weight[c]
+    block_solves.backward_vector(ws.U, x)
 
 
 @kernel(error_model="numpy")
@@ -134,28 +131,16 @@ def solve(ws: Workspace, b: Array, x: Array) -> None:
         x: Output (n_free,).
     """
     couple(ws, b)
-    m = ws.axial.shape[0]
-    X = np.empty((b.shape[0], 1))
     for i in range(b.shape[0]):
-        X[i, 0] = ws.columns[i, m]
-    _finish(ws, X)
-    for i in range(b.shape[0]):
-        x[i] = X[i, 0]
+        x[i] = ws.columns[i, ws.axial.shape[0]]
+    _finish(ws, x)
 
 
 @part(error_model="numpy")
 def solve_again(ws: Workspace, x: Array) -> None:
     """Overwrite x (n_free,) by A^-1 x; ``columns`` and ``small`` as :func:`couple` left them."""
-    m = ws.axial.shape[0]
     block_solves.forward_vector(ws.U, x)
-    weight = np.dot(ws.columns.T, x)
-    block_solves.transposed_vector(ws.small, weight[:m])
-    block_solves.upper_vector(ws.small, weight[:m])
-    weight[m:] = 0.0  # of the right-hand side that lies beside the cables' columns
-    back = np.dot(ws.columns, weight)
-    for k in range(x.shape[0]):
-        x[k] -= back[k]
-    block_solves.backward_vector(ws.U, x)
+    _finish(ws, x)
 
 
 @part(error_model="numpy")
