@@ -39,7 +39,7 @@ def test_a_dry_run_writes_nothing_and_says_what_a_run_would_do(tmp_path, monkeyp
     printed = capsys.readouterr()
     said = json.loads(printed.out)
     assert said["status"] == "success"
-    assert said["steps"] * 0.05 == pytest.approx(said["duration_s"])
+    assert said["steps"] * 0.025 == pytest.approx(said["duration_s"])
     assert said["feasibility"]["tension_n"]["min"] > 1.0
     assert main(["run", "letter_t", "--dry-run"]) == 0
     assert f"{said['steps']} steps" in capsys.readouterr().out

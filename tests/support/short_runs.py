@@ -17,6 +17,7 @@ SHORT = (
     "trajectory.dwell_s=0",
     "trajectory.settle_s=0.2",
     "controller.settle_s=0",
+    "controller.period_s=0.05",
 )
 #: A pipe below the rest pose: the end is at its target almost from the start.
 BELOW = (
