@@ -79,7 +79,9 @@ def test_a_case_wins_over_what_all_runs_have():
 
 BAD = {
     "an unknown key in vary": ({"vary": {"controller.periods": [0.05]}}, "vary", "did you mean period_s"),
-    "a value that is not allowed": ({"vary": {"controller.prediction.horizon_s": [0.8, -1.0]}}, "vary", "must be > 0"),
+    "a value that is not allowed": (
+        {"vary": {"controller.prediction.horizon_s": [0.8, -1.0]}}, "vary", "must be > 0",
+    ),
     "an empty list": ({"vary": {SOFT: []}}, "vary", "at least 1"),
     "an empty range": ({"vary": {SOFT: {"low": 2, "high": 1, "steps": 3}}}, "vary", "must be above low"),
     "no seeds": ({"seeds": "5..3"}, "seeds", "1 to 1000000 seeds; this is 0"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Final
 
 import numpy as np
@@ -183,8 +183,10 @@ class NatNetCameras:
             yield Finding("source", text, ArmingRefusedError.exit_code)
 
     def close(self) -> None:
-        """End the connection."""
+        """End the connection; a frame that nobody has asked for is gone with it."""
         self.client.close()
+        with suppress(HardwareError):
+            self._last = self.client.newest() or self._last
 
 
 def _marker_map(cameras: CameraSettings, mounting: Mounting) -> MarkerMap:
