@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tcrctl.numerics.copies import copy_vector
 from tcrctl.numerics.kernel import kernel, part
 from tcrctl.numerics.rotation import matrix_from_quaternion, norm, rotation_between
 from tcrctl.robot.module import RING
@@ -59,8 +60,7 @@ def _meet(carried: Array, found: Array, there: NDArray[np.bool_]) -> None:
         turn = matrix_from_quaternion(rotation_between(was / norm(was), is_now / norm(is_now)))
     point = np.empty(3)
     for i in range(RING):
-        for j in range(3):
-            point[j] = carried[i, j]
+        copy_vector(carried[i], point)
         _move(turn, old, new, point, carried[i])
 
 

@@ -49,7 +49,7 @@ class _LateLibrary(JITCodeLibrary):  # type: ignore[misc,unused-ignore]
         """Return the address of a function, 0 if it is not defined here."""
         self._ensure_finalized()
         if self._kept is not None:
-            if name.encode() in self._kept[0]:  # among its symbols, all of which could be linked
+            if f"{name}\0".encode() in self._kept[0]:  # one of its symbols, all of which could be linked
                 known: int = self._codegen._engine.get_function_address(name)
                 return known
             self._get_module_for_linking()

@@ -114,7 +114,6 @@ def _finish(ws: Workspace, x: Array) -> None:
             weight[c] += columns[k, c] * x[k]
     block_solves.transposed_vector(ws.small, weight[:m])
     block_solves.upper_vector(ws.small, weight[:m])
-    weight[m:] = 0.0  # of the right-hand side that lies beside the cables' columns
     for k in range(x.shape[0]):
         for c in range(m):
             x[k] -= columns[k, c] * weight[c]
